@@ -337,7 +337,7 @@ class SensorCoverageCoordinator:
         if not plans and self.sources.empty:
             yield from self._find_redundant()
             plans = self._assign()
-        if not plans and self.walking.wake_needed(self.pushing.scan):
+        if not plans and self.walking.wake(self.pushing.scan):
             self._update_fence(self.pushing.scan)
             plans = self._assign()
         return plans

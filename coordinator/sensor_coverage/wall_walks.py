@@ -74,6 +74,7 @@ class WallWalks:
         silent: Collection[int] = (),
     ) -> None:
         self.idle: dict[int, None] = {}
+        self._woken: dict[int, None] = {}  # idle slots that counted again beside an arc that no walk closed
         self.walks = 0
         self._slots = slots
         self._mailbox = mailbox
@@ -234,10 +235,19 @@ class WallWalks:
             idle_legs = idle_legs + 1 if left > before - PROGRESS_RAD or walked.end == SHUT else 0
         self.idle[slots.slot_of()[leader]] = None
 
-    def wake_needed(self, scan: ScanResult) -> bool:
-        """Forget idle slots that are needed; return whether there were any. `scan` has all robots."""
-        idle, self.idle = self.idle, still_idle(self.idle, scan.complex_.neighbours)
-        return self.idle != idle
+    def wake(self, scan: ScanResult) -> bool:
+        """Let idle slots count again where they are needed; return whether there were any. `scan` has all robots.
+
+        One that stands beside an arc that no walk closed keeps other robots from the wall, and its own place may close the
+        arc. It counts again once.
+        """
+        neighbours, before = scan.complex_.neighbours, self.idle
+        self.idle = still_idle(self.idle, neighbours)
+        if self.idle == before:
+            beside = {each for slot in self._walls.unproven for each in neighbours.get(slot, ())} - self._woken.keys()
+            self._woken |= {slot: None for slot in self.idle if slot in beside}
+            self.idle = {slot: None for slot in self.idle if slot not in beside}
+        return self.idle != before
 
     def _open(self, scan: ScanResult) -> float:
         """Return the sum of all open arcs [rad]."""

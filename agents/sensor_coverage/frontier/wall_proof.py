@@ -63,6 +63,16 @@ class Arc(NamedTuple):
     width_rad: float
 
 
+class Crossing(NamedTuple):
+    """Directions of a slot that cross a piece of the way of a walking robot: into the strip beside the wall (+1), or out of it.
+
+    The strip lies between the way and the wall.
+    """
+
+    arc: Arc
+    into: int
+
+
 class NearArc(NamedTuple):
     """An arc around a slot in which its robot followed a wall close to it, with the wall at its `hand`, +1 left, -1 right.
 
@@ -155,6 +165,13 @@ class Walk(NamedTuple):
         """Return the walk in another frame."""
         origin = None if self.origin is None else self.origin._replace(at=turned_vector(self.origin.at, by))
         return self._replace(frame=frame, points=tuple(each.turned(by) for each in self.points), origin=origin)
+
+    def way_from_origin(self) -> Iterator[tuple[float, WalkPoint]]:
+        """Yield the direction [rad] of each point from the origin by odometry, and the point."""
+        if self.origin is not None:
+            x_m, y_m = self.origin.at
+            for each in self.points:
+                yield math.atan2(each.at[1] - y_m, each.at[0] - x_m), each
 
     def unseen_by(self, slots: Collection[int]) -> "Walk":
         """Return the walk as if these slots had not seen it."""
@@ -295,6 +312,27 @@ def united(arcs: Iterable[Arc]) -> list[Arc]:
             found[-1] = Arc(first, min(math.tau, max(found[-1].width_rad, start + width - first)))
         else:
             found.append(Arc(start, width))
+    return found
+
+
+def arcs_into(crossings: Collection[Crossing]) -> list[Arc]:
+    """Return the arcs of directions that cross the way into the strip more often than out of it: they end at the wall."""
+    bounds: dict[float, int] = {}
+    wrapped = 0
+    for (start, width), into in crossings:
+        first = start % math.tau
+        last = first + width
+        bounds[first] = bounds.get(first, 0) + into
+        if last >= math.tau:
+            last -= math.tau
+            wrapped += into
+        bounds[last] = bounds.get(last, 0) - into
+    found = list[Arc]()
+    order = sorted(bounds)
+    for first, last in zip(order, [*order[1:], *(each + math.tau for each in order[:1])], strict=True):
+        wrapped += bounds[first]
+        if wrapped > 0:
+            found.append(Arc(first, last - first))
     return found
 
 

@@ -26,7 +26,8 @@ RADIUS_M = 0.07
 SLOT, OTHER = (0.0, 0.0), (-0.9, 0.1)
 NORTH, EAST = (math.pi / 2.0,), (0.0,)
 # The robot goes west along the south face, round the corner, and north along the west face.
-WAY = [
+Way = list[tuple[tuple[float, float], tuple[float, ...]]]
+WAY: Way = [
     *(((x, 0.01), NORTH) for x in (-0.02, -0.07, -0.12)),
     ((-0.17, 0.02), ()),
     ((-0.2, 0.05), ()),
@@ -58,7 +59,7 @@ def test_a_slot_does_not_see_its_robot_on_the_other_side_of_a_thin_wall() -> Non
     assert sights([(0.1, 0.0), (0.2, 0.0), (0.27, 0.07), (0.2, 0.15), (0.1, 0.15)], 1)[-1] is None
 
 
-def near_arcs(way: list[tuple[tuple[float, float], tuple[float, ...]]]) -> list[NearArc]:
+def near_arcs(way: Way) -> list[NearArc]:
     points = [NearPoint(at, walls) for at, walls in way]
     return [NearArc(each, -1) for each in united_round(Arc(*one) for one in arcs_around(SLOT, points, -1, RADIUS_M))]
 
@@ -75,32 +76,49 @@ def test_a_way_round_a_corner_closes_no_directions_past_the_corner() -> None:
     assert not any(is_closed(closed, each) for each in (155.0, 165.0, 170.0, 174.0))
 
 
-def open_at_slot(origin: int | None) -> list[Arc]:
-    """Return the open arcs of slot 0 after this way, in sight of slot 1."""
-    views = {0: {1: math.atan2(OTHER[1], OTHER[0])}, 1: {0: math.atan2(-OTHER[1], -OTHER[0])}}
+def open_at_slot(
+    origin: int | None, other: tuple[float, float] = OTHER, way: Way = WAY, lost_after: int = 99
+) -> list[Arc]:
+    """Return the open arcs of slot 0 after a way in sight of slot 1, which stands at a place [m], up to a point."""
+    there = math.atan2(other[1], other[0])
+    views = {0: {1: there}, 1: {0: there + math.pi}}
     scan = ScanResult(views, FlagComplex({slot: set(seen) for slot, seen in views.items()}), ())
     slots = Slots()
-    for slot in (0, 1):
-        slots.occupant[slot] = slot
     for robot in (0, 1):
-        slots.heading[robot], slots.frame[robot] = 0.0, 0
+        slots.occupant[robot], slots.heading[robot], slots.frame[robot] = robot, 0.0, 0
     waypoints = []
-    for number, ((x, y), walls) in enumerate(WAY):
-        seen = (Sighting(1, math.atan2(OTHER[1] - y, OTHER[0] - x)),)
-        back = start_in_sight(SLOT, [SLOT, *(at for at, _ in WAY[: number + 1])], -1, RADIUS_M)
+    for number, ((x, y), walls) in enumerate(way):
+        seen = () if number > lost_after else (Sighting(1, math.atan2(other[1] - y, other[0] - x)),)
+        back = start_in_sight(SLOT, [SLOT, *(at for at, _ in way[: number + 1])], -1, RADIUS_M)
         waypoints.append(Waypoint(x, y, seen, walls, (), back))
     slots.take_walk(0, -1, waypoints, RADIUS_M, origin=None if origin is None else Origin(origin, SLOT))
     proof = SwarmProof()
-    proof.update(scan, slots.walks, {}, {0: near_arcs(WAY)}, {})
+    proof.update(scan, slots.walks, {}, {0: near_arcs(way)}, {})
     return proof.open_arcs().get(0, [])
 
 
 def test_a_way_close_to_a_slot_closes_the_triangle_with_a_robot_that_sees_it() -> None:
     """Between the corner and the other robot, at 174 degrees, is the triangle with the robot behind the corner."""
-    assert not is_closed(open_at_slot(origin=0), 160.0)
-    assert not is_closed(open_at_slot(origin=0), 153.0), "no body passes between the robot and the corner"
+    found = open_at_slot(origin=0)
+    assert not is_closed(found, 160.0)
+    assert not is_closed(found, 153.0), "no body passes between the robot and the corner"
     for direction_deg in (153.0, 160.0):
         assert is_closed(open_at_slot(origin=None), direction_deg), "the slot did not see the way"
+
+
+def test_a_triangle_with_a_robot_beside_the_point_closes_nothing() -> None:
+    """The other robot is 0.15 m from the point: by an error of its bearing it may stand on the other side."""
+    assert is_closed(open_at_slot(origin=0, other=(-0.35, 0.095)), 160.0)
+
+
+@pytest.mark.parametrize(("lost_after", "closed"), [(99, True), (2, False)])
+def test_a_robot_that_loses_sight_of_a_way_straight_away_from_a_slot_is_not_relied_on(
+    lost_after: int, closed: bool
+) -> None:
+    """The robot goes north along a wall in the east. Behind a corner the other one, in the west, sees it no more."""
+    way: Way = [((0.0, 0.05 * each), EAST) for each in range(2, 8)]
+    found = open_at_slot(origin=0, other=(-0.9, -0.2), way=way, lost_after=lost_after)
+    assert is_closed(found, 120.0) != closed
 
 
 def test_a_walk_keeps_the_slot_that_its_robot_left() -> None:

@@ -2,8 +2,14 @@
 
 import pytest
 
+from zwerm.agents.runtime.node import Node
+from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.frontier.wall_proof import WalkPoint
+from zwerm.coordinator.sensor_coverage.coordinator import SensorCoverageCoordinator
 from zwerm.coordinator.sensor_coverage.wall_walks import still_idle, without_witnesses
+from zwerm.deploy.node_specs import node_specs
+from zwerm.maths.simplicial import FlagComplex
+from zwerm.scenario.load import load
 
 IDLE = dict.fromkeys((7, 8, 9))
 
@@ -25,3 +31,18 @@ def test_a_robot_is_idle_only_where_a_standing_robot_sees_it(
 def test_a_robot_that_alone_saw_a_walking_robot_is_not_idle() -> None:
     points = [WalkPoint(dict.fromkeys(seen, 0.0), (), ()) for seen in ((1, 7), (7, 8), (1, 2), ())]
     assert list(without_witnesses(IDLE, points)) == [9]
+
+
+def test_an_idle_robot_beside_an_arc_that_no_walk_closes_counts_again_once() -> None:
+    coordinator = Node(*node_specs(load("sensor-coverage", ("robots.count=3",)), 1)[3])._controller
+    assert isinstance(coordinator, SensorCoverageCoordinator)
+    walking = coordinator.walking
+    views = {1: {2: 0.0, 7: 1.0}, 2: {1: 0.0, 8: 1.0}, 7: {1: 0.0}, 8: {2: 0.0}}
+    scan = ScanResult(views, FlagComplex(views), ())
+    walking.idle = dict.fromkeys((7, 8))
+    assert not walking.wake(scan)
+    coordinator.walls.unproven = (1,)
+    assert walking.wake(scan)
+    assert list(walking.idle) == [8]
+    walking.idle[7] = None
+    assert not walking.wake(scan)

@@ -7,7 +7,7 @@ counts again only when a view or a wall has changed, also if a third slot that s
 
 import math
 from bisect import bisect_left, bisect_right
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from operator import itemgetter
 from typing import Final
 
@@ -29,18 +29,27 @@ class PointTriangles:
     def __init__(self) -> None:
         self._stretch_of: dict[int, int] = {}  # the number of the first point of the stretch, by the number of a point
         self._seers: dict[int, dict[int, None]] = {}  # the slots that saw a walk, by the number of its first point
-        self._seen: dict[int, list[tuple[int, WalkPoint]]] = {}  # the points that a slot saw, each with its walk
+        # The points that a slot saw, each with its walk and its directions [rad].
+        self._seen: dict[int, list[tuple[int, WalkPoint, tuple[float, ...]]]] = {}
         # The points that a slot saw, and another one that saw the same walk did not. They hold for the number of points that
         # the slot saw.
         self._lost: dict[tuple[int, int], tuple[int, list[_Lost]]] = {}
-        self._basis: dict[int, tuple[object, object]] = {}
+        self._basis: dict[int, tuple[object, object, object]] = {}
         self._pairs: dict[int, tuple[Pair, ...]] = {}
 
     def add(self, slot: int, number: int, stretch: int, walk: int, point: WalkPoint) -> None:
         """Add a point of a walk that a slot saw; `stretch` and `walk` are the numbers of their first points."""
         self._stretch_of[number] = stretch
         self._seers.setdefault(walk, {})[slot] = None
-        self._seen.setdefault(slot, []).append((walk, point))
+        self._seen.setdefault(slot, []).append((walk, point, (point.seen[slot],)))
+
+    def add_way(self, slot: int, walk: int, points: Iterable[tuple[float, WalkPoint]]) -> None:
+        """Add the points of a walk that began at a slot, and their directions [rad] from there, also those out of its sight.
+
+        Such a way may lead straight away from the slot. So these points count in directions close to their own, too.
+        """
+        aside = 2.0 * HIDDEN_MIN_RAD
+        self._seen.setdefault(slot, []).extend((walk, point, (there - aside, there + aside)) for there, point in points)
 
     def stretch_of(self, number: int) -> int:
         """Return the number of the first point of a point's stretch, or -1."""
@@ -63,18 +72,19 @@ class PointTriangles:
         neighbours: Mapping[int, Collection[int]],
         versions: Mapping[int, int],
         at_walls: Beyond,
+        close: Collection[Pair] = (),
     ) -> tuple[Pair, ...]:
         """Find the triangles with a point that count, each at its first slot; see `fan_of`.
 
-        `versions` count the changes of views.
+        `versions` count the changes of views. The triangles of the pairs `close` do not count.
         """
-        basis = [(slot, versions[slot]) for slot in point.seen if slot in neighbours], at_walls
+        basis = [(slot, versions[slot]) for slot in point.seen if slot in neighbours], at_walls, close
         if self._basis.get(number) == basis and not any(
             self._hides(pair, point, views, neighbours) for pair in self._pairs[number]
         ):
             return self._pairs[number]
         self._basis[number] = basis
-        hidden: dict[Pair, None] = {}
+        hidden = dict.fromkeys(close)
         while True:
             pairs = fan_of(point, views, neighbours, at_walls, hidden)
             more = [pair for pair in pairs if self._hides(pair, point, views, neighbours)]
@@ -107,9 +117,10 @@ class PointTriangles:
         count, known = self._lost.setdefault((slot, other), (0, []))
         if count != len(points):
             known += (
-                (each.seen[slot] % math.tau, tuple(one for one in each.seen if one != slot))
-                for walk, each in points[count:]
-                if other not in each.seen and other in self._seers[walk]
+                (there % math.tau, tuple(one for one in each.seen if one != slot))
+                for walk, each, directions in points[count:]
+                if other not in each.seen and other in self._seers.get(walk, ())
+                for there in directions
             )
             known.sort(key=_DIRECTION)
             self._lost[slot, other] = len(points), known

@@ -21,9 +21,7 @@ from zwerm.agents.sensor_coverage.frontier.proofs.sight_ends import (
 )
 from zwerm.agents.sensor_coverage.frontier.proofs.walk_origins import WalkOrigins
 from zwerm.agents.sensor_coverage.frontier.strips.crossings import (
-    Crossing,
     arcs_beside_pocket,
-    arcs_into,
     crossings_of_pocket,
     crossings_of_step,
 )
@@ -32,12 +30,14 @@ from zwerm.agents.sensor_coverage.frontier.strips.stretches import pockets_besid
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     CONTACT_RAD,
     Arc,
+    Crossing,
     NearArc,
     SeenPoint,
     TouchCounter,
     Walk,
     WalkPoint,
     arc_between,
+    arcs_into,
     arcs_of_robots,
     arcs_of_walls,
     complement,
@@ -172,6 +172,8 @@ class SwarmProof:
                 for each in dict.fromkeys(each for witnesses in relied for each in witnesses):
                     self._witnessed.setdefault(each, {})[slot] = None
             self._origins.add(len(self._points), walk)
+            if walk.origin is not None:
+                self._triangles.add_way(walk.origin.slot, len(self._points), walk.way_from_origin())
             self._points += walk.points
         self._count = len(walks)
 
@@ -228,8 +230,7 @@ class SwarmProof:
             kept = (number for its_side, number in numbers.items() if its_pair != pair or its_side != side)
             for each in kept:
                 if (slot, other) in self._triangles.pairs(each):
-                    fans.append(arc_between(view[other], self._points[each].seen[slot]))
-                    fans += self._origins.arcs_beyond(slot, each, view[other])
+                    fans += self._origins.arcs_of_triangle(slot, each, self._points[each], view[other])
         touched, beside = arcs_of_walls(self._around[slot].touched), self._closed_by_robots(slot)
         opened = complement([*self._followed[slot], *touched, *beside, *fans])
         contacts = touched if slot in self._scan.bases else ()  # a station cannot look behind what it touches
@@ -305,9 +306,9 @@ class SwarmProof:
 
     def _arcs_to_walls(self, slot: int) -> list[Arc]:
         """Return the arcs at a slot that end at followed walls or at contacts. They are disjoint."""
-        around = self._around[slot]
-        contacts = arcs_of_walls(around.touched, CONTACT_RAD)
+        around, contacts = self._around[slot], arcs_of_walls(self._around[slot].touched, CONTACT_RAD)
         crossings: dict[int, list[Crossing]] = {}
+        beside: dict[tuple[int, bool], tuple[int, Pocket]] = {}  # by stretch and end, with the hand
         edges: dict[int, list[SightEnd]] = {}
         for _, before, point, hand, between, stretch, ends, pockets, sight_ends in self._passed.get(slot, ()):
             if not self._counts(point) or (before is not None and not self._counts(before)):
@@ -317,9 +318,12 @@ class SwarmProof:
                 crossings.setdefault(stretch, []).extend(crossings_of_step(slot, before, point, hand, loose))
             edges.setdefault(stretch, []).extend(each for each in sight_ends if each.is_loose(self._neighbours))
             for first_number, pocket in pockets:
-                is_loose = not pocket.other.is_tied(self._neighbours)
-                crossings.setdefault(first_number, []).extend(crossings_of_pocket(hand, pocket, is_loose))
                 contacts += arcs_beside_pocket(hand, pocket, around.touched)
+                if pocket.in_touch or (first_number, pocket.is_last) not in beside:
+                    beside[first_number, pocket.is_last] = hand, pocket
+        for (first_number, _), (hand, pocket) in beside.items():
+            is_loose = not pocket.other.is_tied(self._neighbours)
+            crossings.setdefault(first_number, []).extend(crossings_of_pocket(hand, pocket, is_loose))
         by_stretch = self._by_stretch[slot] = {number: arcs_into(each) for number, each in crossings.items()}
         all_edges = [edge for each in edges.values() for edge in each]
         edged = without_edges([*contacts, *shortened(around.near)], all_edges)
@@ -342,7 +346,8 @@ class SwarmProof:
             return ()
         standing = [slot for slot in point.seen if slot in self._neighbours]
         at_walls = {(slot, side): self._ends_beyond(slot, number, side) for slot in standing for side in (1, -1)}
-        return self._triangles.find(number, point, self._scan.views, self._neighbours, self._versions, at_walls)
+        beside = self._origins.beside(number, self._scan.views)
+        return self._triangles.find(number, point, self._scan.views, self._neighbours, self._versions, at_walls, beside)
 
     def _ends_beyond(self, slot: int, number: int, side: int) -> bool:
         """Return whether the wall that was followed at a point lies beyond the line of sight to it, on one side.

@@ -4,20 +4,31 @@ No body passes between a robot and the wall that it touches. So a triangle of th
 walk goes on to the touched point of the wall.
 """
 
-from collections.abc import Iterator
-from typing import NamedTuple
+import math
+from collections.abc import Iterator, Mapping
+from typing import Final, NamedTuple
 
-from zwerm.agents.sensor_coverage.frontier.fans import side_of
+from zwerm.agents.sensor_coverage.frontier.fans import Pair, side_of
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import direction_of, touched_point
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, Walk, WalkPoint, arc_between
 
+Views = Mapping[int, Mapping[int, float]]
+
+# A robot closer to a point than this many diameters of a body is beside it: the directions there are too uncertain.
+BESIDE_DIAMETERS: Final = 2.0
+
 
 class _Touched(NamedTuple):
-    """The slot, the point that it saw, and the directions [rad] in which it sees the walls that were touched there."""
+    """The slot, the point that it saw, and the directions [rad] in which it sees the walls that were touched there.
+
+    It has the distance [m] of the point, and the distance below which a robot is beside the point.
+    """
 
     slot: int
     point: WalkPoint
     directions: tuple[float, ...]
+    distance_m: float
+    close_m: float
 
 
 class WalkOrigins:
@@ -34,7 +45,23 @@ class WalkOrigins:
         for number, point in enumerate(walk.points, first):
             if slot in point.seen and point.walls:
                 walls = (touched_point(point.at, wall, walk.radius_m) for wall in point.walls)
-                self._touched[number] = _Touched(slot, point, tuple(direction_of(place, each) for each in walls))
+                directions = tuple(direction_of(place, each) for each in walls)
+                distance_m, close_m = math.dist(place, point.at), 2.0 * BESIDE_DIAMETERS * walk.radius_m
+                self._touched[number] = _Touched(slot, point, directions, distance_m, close_m)
+
+    def beside(self, number: int, views: Views) -> tuple[Pair, ...]:
+        """Return the pairs of the slot and another one whose robot stands beside a point. The angles tell its distance."""
+        known = self._touched.get(number)
+        if known is None or known.slot not in views:
+            return ()
+        slot, point, found = known.slot, known.point, list[Pair]()
+        for other, there in views[slot].items():
+            if other in point.seen and slot in views.get(other, ()):
+                here = abs(math.sin(math.remainder(there - point.seen[slot], math.tau)))
+                apart = abs(math.sin(math.remainder(views[other][slot] - point.seen[other], math.tau)))
+                if known.distance_m * here < known.close_m * apart:
+                    found += [(slot, other), (other, slot)]
+        return tuple(found)
 
     def touched(self, slot: int, number: int, side: int) -> Iterator[float]:
         """Yield the directions [rad] from a slot of the walls touched at a point, on one side of the point (+1 left, -1 right).
@@ -45,12 +72,12 @@ class WalkOrigins:
         if known is not None and known.slot == slot:
             yield from (each for each in known.directions if side_of(known.point, slot, each) == side)
 
-    def arcs_beyond(self, slot: int, number: int, other_rad: float) -> Iterator[Arc]:
-        """Yield the arcs at a slot from a point to the walls touched there, on the side away from another slot.
+    def arcs_of_triangle(self, slot: int, number: int, point: WalkPoint, other_rad: float) -> Iterator[Arc]:
+        """Yield the arcs at a slot that its triangle with a point and another slot, in the direction [rad], closes.
 
-        They are closed where the triangle of the two slots and the point counts. The other slot is in the direction [rad].
+        It goes on to the walls touched at the point, on the side away from the other slot.
         """
-        known = self._touched.get(number)
-        if known is not None and known.slot == slot:
-            for each in self.touched(slot, number, -side_of(known.point, slot, other_rad)):
-                yield arc_between(known.point.seen[slot], each)
+        there = point.seen[slot]
+        yield arc_between(other_rad, there)
+        for each in self.touched(slot, number, -side_of(point, slot, other_rad)):
+            yield arc_between(there, each)

@@ -9,8 +9,8 @@ end: the pocket.
 """
 
 import math
-from collections.abc import Collection, Iterable, Iterator
-from typing import Final, NamedTuple
+from collections.abc import Iterable, Iterator
+from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import (
     Pocket,
@@ -24,6 +24,7 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     CONTACT_RAD,
     LEAVING_M_MIN,
     Arc,
+    Crossing,
     WalkPoint,
     arc_between,
     shared_arcs,
@@ -35,16 +36,6 @@ from zwerm.agents.sensor_coverage.motion.homing import unit
 OVERHANG: Final = 1.0
 # An opening narrower than this many diameters of a body need not be found.
 PASSABLE: Final = 1.3
-
-
-class Crossing(NamedTuple):
-    """Directions of a slot that cross a piece of the way of a walking robot: into the strip beside the wall (+1), or out of it.
-
-    The strip lies between the way and the wall.
-    """
-
-    arc: Arc
-    into: int
 
 
 def crossings_of_step(
@@ -123,24 +114,3 @@ def _arc_between_walls(pocket: Pocket, other: Vector) -> Iterator[Arc]:
     apart_m = math.dist(pocket.end.touched, other)
     if apart_m <= 2.0 * (PASSABLE - math.sin(CONTACT_RAD)) * pocket.radius_m and arc.width_rad <= math.pi / 2.0:
         yield arc
-
-
-def arcs_into(crossings: Collection[Crossing]) -> list[Arc]:
-    """Return the arcs of directions that cross the way into the strip more often than out of it: they end at the wall."""
-    bounds: dict[float, int] = {}
-    wrapped = 0
-    for (start, width), into in crossings:
-        first = start % math.tau
-        last = first + width
-        bounds[first] = bounds.get(first, 0) + into
-        if last >= math.tau:
-            last -= math.tau
-            wrapped += into
-        bounds[last] = bounds.get(last, 0) - into
-    found = list[Arc]()
-    order = sorted(bounds)
-    for first, last in zip(order, [*order[1:], *(each + math.tau for each in order[:1])], strict=True):
-        wrapped += bounds[first]
-        if wrapped > 0:
-            found.append(Arc(first, last - first))
-    return found

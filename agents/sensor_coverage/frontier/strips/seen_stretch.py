@@ -5,15 +5,13 @@ from itertools import product
 from typing import NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.strips.crossings import (
-    Crossing,
     arcs_beside_pocket,
-    arcs_into,
     crossings_of_pocket,
     crossings_of_step,
 )
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStretch, Pocket, StretchEnd
 from zwerm.agents.sensor_coverage.frontier.strips.stretches import pocket_of
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, WalkPoint, overlap
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, Crossing, WalkPoint, arcs_into, overlap
 
 
 class SeenStep(NamedTuple):
@@ -122,7 +120,11 @@ class SeenStretch:
         for step in self._steps:
             for crossing in crossings_of_step(self._slot, step.before, step.point, self._hand, ends):
                 yield _Crossed(crossing, step.needed, step.seen)
+        beside: dict[bool, tuple[Pocket, tuple[int, ...]]] = {}  # a direction crosses each end once
         for pocket, seen in self._pockets():
+            if pocket.in_touch or pocket.is_last not in beside:
+                beside[pocket.is_last] = pocket, seen
+        for pocket, seen in beside.values():
             for crossing in crossings_of_pocket(self._hand, pocket, pocket.other in ends):
                 yield _Crossed(crossing, (), seen)
 

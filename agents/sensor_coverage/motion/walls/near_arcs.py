@@ -6,14 +6,20 @@ from itertools import combinations, dropwhile, pairwise
 from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.directions import angle_between
-from zwerm.agents.sensor_coverage.frontier.strips.crossings import Crossing, arcs_into
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import (
     direction_of,
     ends_of_stretch,
     kept_part,
     touched_point,
 )
-from zwerm.agents.sensor_coverage.frontier.wall_proof import CONTACT_RAD, SAME_WALL_RAD, arc_between, drives_away
+from zwerm.agents.sensor_coverage.frontier.wall_proof import (
+    CONTACT_RAD,
+    SAME_WALL_RAD,
+    Crossing,
+    arc_between,
+    arcs_into,
+    drives_away,
+)
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
 from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
 

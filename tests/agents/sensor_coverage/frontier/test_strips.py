@@ -8,10 +8,10 @@ import pytest
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.frontier.proofs.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
-from zwerm.agents.sensor_coverage.frontier.strips.crossings import Crossing, arcs_beside_pocket, arcs_into
+from zwerm.agents.sensor_coverage.frontier.strips.crossings import arcs_beside_pocket
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStretch, Pocket, StretchEnd, touched_point
 from zwerm.agents.sensor_coverage.frontier.strips.stretches import pocket_of
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, Walk, WalkPoint
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, Crossing, Walk, WalkPoint, arcs_into
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
 from zwerm.maths.simplicial import FlagComplex
 
@@ -103,6 +103,24 @@ def test_a_pocket_ends_a_body_beside_the_touched_wall() -> None:
     assert closed_deg(touching) == [(-45, -4)], "through the strip the slot looks past its other end, at -4.4 degrees"
     assert closed_deg(tied(touching), 1) == [(-45, 0)]
     assert closed_deg(touching._replace(points=touching.points[-1:])) == [], "the robot touched the wall once only"
+
+
+def test_a_robot_that_is_touched_twice_at_an_end_looks_past_it_once() -> None:
+    """The walking robot goes from the slot's robot, at 30 degrees, along a wall in the west. It touched the robot before that.
+
+    By its bearing then, 10 degrees off, the robot looks into the strip beside the wall from 22 degrees on.
+    """
+    west, deg = (math.pi,), math.radians
+    points = (
+        WalkPoint({0: deg(-20.0)}, (), (0,), at=(0.138, -0.024)),
+        WalkPoint({0: deg(30.0)}, west, (0,), at=(0.12, 0.07)),
+        WalkPoint({0: deg(45.0)}, west, (), at=(0.12, 0.12)),
+        WalkPoint({0: deg(55.0)}, west, (), at=(0.12, 0.17)),
+    )
+    stretches = proof_of(Walk(0, 1, points, RADIUS_M), (0,))._by_stretch[0].values()
+    into = [arc for arcs in stretches for arc in arcs]
+    assert not any((deg(25.0) - start) % math.tau < width for start, width in into)
+    assert all((deg(first) - start) % math.tau >= width for start, width in into for first in (32.0, 50.0)), "and out"
 
 
 def way_to(direction_rad: float) -> Walk:
