@@ -30,10 +30,11 @@ class CoverageProof(Protocol):
         touched: Mapping[int, Sequence[float]],
         near: Mapping[int, Sequence[NearArc]],
         in_touch: Mapping[int, Collection[int]],
+        occupants: Mapping[int, int],
     ) -> tuple[int, ...]:
         """Take in a scan, all walks, and by slot the directions [rad] of walls in touch and the arcs of walls close to it.
 
-        `in_touch` has the slots whose robots are in touch.
+        `in_touch` has the slots whose robots are in touch, and `occupants` the robots by slot.
 
         Return the slots around which points of walks count no more, because a slot that saw them is gone.
         """

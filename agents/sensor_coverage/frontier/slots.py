@@ -10,7 +10,7 @@ frame of one robot, at first the robot's own. Two frames that meet become one.
 
 import cmath
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from operator import itemgetter
 
@@ -59,6 +59,7 @@ class Slots:
         self.touching: dict[int, list[float]] = {}
         self.in_touch: dict[int, tuple[int, ...]] = {}  # the robots that the occupant of a slot touches now
         self.near: dict[int, list[NearArc]] = {}
+        self._near_robot: dict[int, int] = {}  # whose way that was, by slot
         self.walks: list[Walk] = []
         self.length_m: dict[tuple[int, int], float] = {}
         self._way_m: dict[tuple[int, int], float] = {}  # driven from slot to slot, at the last time
@@ -235,12 +236,28 @@ class Slots:
             for before, each in pairwise(waypoints[:1] + waypoints)
         )
         if origin is not None:
-            origin = Origin(origin.slot, turned_vector(origin.at, heading))
+            origin = Origin(origin.slot, turned_vector(origin.at, heading), self.occupant[origin.slot])
         before_it = () if after is None else tail(self.walks[after].points, JOINED_M)
         self.walks.append(
             Walk(frame, hand, before_it + points, radius_m, slot_of.get(robot) if stays else None, origin)
         )
         return len(self.walks) - 1
+
+    def note_near(self, slot: int, arcs: Sequence[NearArc]) -> None:
+        """Record all arcs of walls close to a slot, along which the robot there drove."""
+        self.near[slot] = list(arcs)
+        self._near_robot[slot] = self.occupant[slot]
+
+    def take_replaced(self) -> tuple[int, ...]:
+        """Forget the walls close to slots at which another robot stands, and return these slots.
+
+        It may stand 0.05 m from where the former one did, and sees a wall 0.1 m away in other directions.
+        """
+        replaced = tuple(slot for slot, robot in self._near_robot.items() if self.occupant.get(slot) != robot)
+        for slot in replaced:
+            self.near.pop(slot, None)
+            del self._near_robot[slot]
+        return replaced
 
     # --- directions between slots -----------------------------------------------------------------------------------
 

@@ -61,8 +61,10 @@ class WallPlans:
         slots, proof = self._slots, self._proof
         if proof is None:
             raise RuntimeError("the arcs of all slots are known with a coordinator only")
+        for slot in slots.take_replaced():
+            self.probed.pop(slot, None)
         touched = {slot: slots.touching.get(slot, ()) for slot in scan.complex_.vertices}
-        stale = proof.update(scan, slots.walks, touched, slots.near, slots.slots_in_touch())
+        stale = proof.update(scan, slots.walks, touched, slots.near, slots.slots_in_touch(), slots.occupant)
         displaced = slots.take_displaced()
         for slot in (*stale, *displaced):
             self.tried.pop(slot, None)
@@ -205,7 +207,7 @@ class WallPlans:
         same = [each.arc for each in known if each.hand == hand]
         fresh = [each for each in united_round(Arc(*each) for each in arcs) if not contains(same, each)]
         kept = [each for each in known if each.hand != hand or not contains(fresh, each.arc)]
-        self._slots.near[slot] = [*kept, *(NearArc(each, hand) for each in fresh)]
+        self._slots.note_near(slot, [*kept, *(NearArc(each, hand) for each in fresh)])
 
 
 def _edge_at_wall(arc: Arc, robots: Collection[float]) -> int:

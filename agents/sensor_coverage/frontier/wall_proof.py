@@ -141,10 +141,14 @@ class WallStep(NamedTuple):
 
 
 class Origin(NamedTuple):
-    """The slot that a walking robot left, and its place [m] by the robot's odometry, in the frame of the directions."""
+    """The slot that a walking robot left, and its place [m] by the robot's odometry, in the frame of the directions.
+
+    `robot` stood there. Another one at the slot stands elsewhere, as far as is known.
+    """
 
     slot: int
     at: tuple[float, float]
+    robot: int = -1
 
 
 class Walk(NamedTuple):

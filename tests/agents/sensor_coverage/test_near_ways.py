@@ -77,7 +77,7 @@ def test_a_way_round_a_corner_closes_no_directions_past_the_corner() -> None:
 
 
 def open_at_slot(
-    origin: int | None, other: tuple[float, float] = OTHER, way: Way = WAY, lost_after: int = 99
+    origin: int | None, other: tuple[float, float] = OTHER, way: Way = WAY, lost_after: int = 99, robot_then: int = 0
 ) -> list[Arc]:
     """Return the open arcs of slot 0 after a way in sight of slot 1, which stands at a place [m], up to a point."""
     there = math.atan2(other[1], other[0])
@@ -93,7 +93,7 @@ def open_at_slot(
         waypoints.append(Waypoint(x, y, seen, walls, (), back))
     slots.take_walk(0, -1, waypoints, RADIUS_M, origin=None if origin is None else Origin(origin, SLOT))
     proof = SwarmProof()
-    proof.update(scan, slots.walks, {}, {0: near_arcs(way)}, {})
+    proof.update(scan, slots.walks, {}, {0: near_arcs(way)}, {}, {0: robot_then, 1: 1})
     return proof.open_arcs().get(0, [])
 
 
@@ -104,6 +104,22 @@ def test_a_way_close_to_a_slot_closes_the_triangle_with_a_robot_that_sees_it() -
     assert not is_closed(found, 153.0), "no body passes between the robot and the corner"
     for direction_deg in (153.0, 160.0):
         assert is_closed(open_at_slot(origin=None), direction_deg), "the slot did not see the way"
+
+
+def test_what_a_robot_saw_of_its_way_counts_while_it_stands_there() -> None:
+    assert is_closed(open_at_slot(origin=0, robot_then=5), 160.0)
+
+
+def test_another_robot_at_a_slot_does_not_know_the_walls_close_to_it() -> None:
+    slots = Slots()
+    slots.occupant[4] = 9
+    slots.note_near(4, [NearArc(Arc(0.0, 1.0), 1)])
+    assert slots.take_replaced() == ()
+    assert 4 in slots.near
+    slots.occupant[4] = 8
+    assert slots.take_replaced() == (4,)
+    assert 4 not in slots.near
+    assert slots.take_replaced() == ()
 
 
 def test_a_triangle_with_a_robot_beside_the_point_closes_nothing() -> None:

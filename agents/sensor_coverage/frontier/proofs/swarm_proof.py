@@ -6,16 +6,17 @@ A walk ends where no standing robot sees it, and the deployment goes on from the
 the robots that saw it. When one of them is gone, nothing is known of its part: the points that it saw close nothing.
 """
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.fans import Pair, side_of
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
+from zwerm.agents.sensor_coverage.frontier.proofs.passed_points import Passed, passes
 from zwerm.agents.sensor_coverage.frontier.proofs.point_triangles import PointTriangles
 from zwerm.agents.sensor_coverage.frontier.proofs.sight_ends import (
     SightEnd,
     shortened,
-    sight_ends_at,
     with_islands,
     without_edges,
 )
@@ -25,15 +26,12 @@ from zwerm.agents.sensor_coverage.frontier.strips.crossings import (
     crossings_of_pocket,
     crossings_of_step,
 )
-from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import Pocket, StretchEnd
-from zwerm.agents.sensor_coverage.frontier.strips.stretches import pockets_beside, stretches_of
+from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import Pocket
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     CONTACT_RAD,
     Arc,
     Crossing,
     NearArc,
-    SeenPoint,
-    TouchCounter,
     Walk,
     WalkPoint,
     arc_between,
@@ -43,7 +41,6 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     complement,
     ends_at,
     overlap,
-    point_before,
     united,
 )
 from zwerm.maths.simplicial import FlagComplex
@@ -51,26 +48,6 @@ from zwerm.maths.sums import added
 
 # A triangle closes more than another one only if the difference is larger than this [rad].
 EQUAL_RAD: Final = 1e-6
-
-
-class Passed(NamedTuple):
-    """A point of a walk that a slot saw, the point before it if that closes an arc, and the hand at the wall.
-
-    `number` counts the points of all walks. The slot did not see the points between these two. Each of them was seen by
-    other slots. `stretch` is the number of the first point of the stretch of wall, and `ends` are the ends of the wall from the
-    point before to this one. `pockets` are set if the walking robot touched the slot's robot beside an end, each with the
-    number of the first point of its stretch. `sight_ends` are set where the slot did not see the next point.
-    """
-
-    number: int
-    before: WalkPoint | None
-    point: WalkPoint
-    hand: int
-    between: tuple[Collection[int], ...]
-    stretch: int = -1
-    ends: tuple[StretchEnd, ...] = ()
-    pockets: tuple[tuple[int, Pocket], ...] = ()
-    sight_ends: tuple[SightEnd, ...] = ()
 
 
 class ArcBasis(NamedTuple):
@@ -81,6 +58,7 @@ class ArcBasis(NamedTuple):
     touched: Sequence[float]
     near: Sequence[NearArc]
     in_touch: Sequence[int]
+    robot: int | None
 
 
 class SwarmProof:
@@ -98,6 +76,7 @@ class SwarmProof:
 
     def _forget(self) -> None:
         self._scan = ScanResult({}, FlagComplex({}), ())
+        self._robots: dict[int, int] = {}  # at slots at which walks have begun
         self._neighbours: dict[int, frozenset[int]] = {}
         self._around: dict[int, ArcBasis] = {}
         self._followed: dict[int, list[Arc]] = {}  # arcs that end at followed walls or at contacts, by slot
@@ -116,16 +95,17 @@ class SwarmProof:
         touched: Mapping[int, Sequence[float]],
         near: Mapping[int, Sequence[NearArc]],
         in_touch: Mapping[int, Collection[int]],
+        occupants: Mapping[int, int] = MappingProxyType({}),
     ) -> tuple[int, ...]:
         """Take in a scan, all walks, and by slot the directions [rad] of walls in touch and the arcs of walls close to it.
 
-        `in_touch` has the slots whose robots are in touch.
+        `in_touch` has the slots whose robots are in touch, and `occupants` the robots by slot.
 
         Return the slots around which points of walks count no more, because a slot that saw them is gone.
         """
         before = self._neighbours
         self._index(walks)
-        self._scan = scan
+        self._scan, self._robots = scan, self._origins.robots_at(occupants)
         complex_ = scan.complex_
         gone = [slot for slot in before if slot not in complex_.neighbours]
         back = [slot for slot in self._gone if slot in complex_.neighbours]
@@ -137,7 +117,8 @@ class SwarmProof:
             beside = {each: view[each] for each in complex_.neighbours[slot]}
             robots = [each for each in in_touch.get(slot, ()) if each in beside]
             passed = len(self._passed.get(slot, ()))
-            now = ArcBasis(passed, beside, touched.get(slot, ()), tuple(near.get(slot, ())), robots)
+            robot = self._robots.get(slot)
+            now = ArcBasis(passed, beside, touched.get(slot, ()), tuple(near.get(slot, ())), robots, robot)
             known = self._around.get(slot)
             if known != now:
                 if known is None or known.view != now.view:
@@ -164,7 +145,7 @@ class SwarmProof:
             self._points, self._passed, self._witnessed, self._origins = [], {}, {}, WalkOrigins()
             self._forget()
         for walk in walks[self._count :]:
-            for slot, passed in _passes(walk, len(self._points)):
+            for slot, passed in passes(walk, len(self._points)):
                 self._passed.setdefault(slot, []).append(passed)
                 self._triangles.add(slot, passed.number, passed.stretch, len(self._points), passed.point)
                 ends = (*passed.ends, *(pocket.other for _, pocket in passed.pockets))
@@ -243,7 +224,7 @@ class SwarmProof:
     def _closed_by_robots(self, slot: int) -> list[Arc]:
         """Return the arcs of a slot that triangles of robots and robots in touch close."""
         view, beside = self._scan.views[slot], self._neighbours[slot]
-        _, _, touched, _, robots = self._around[slot]
+        touched, robots = self._around[slot].touched, self._around[slot].in_touch
         bodies = list(arcs_of_robots([view[each] for each in robots], touched))
         return bodies + [arc_between(view[a], view[b]) for a in beside for b in beside & self._neighbours[a] if a < b]
 
@@ -340,7 +321,7 @@ class SwarmProof:
 
     def _valid(self, number: int) -> tuple[Pair, ...]:
         """Return (slot, other slot) for each triangle with the point of this number that counts at the slot."""
-        point = self._points[number]
+        point = self._origins.standing(number, self._points[number], self._robots)
         if not self._counts(point):
             self._triangles.drop(number)
             return ()
@@ -366,35 +347,3 @@ class SwarmProof:
 def _pair_of(slot: int, other: int) -> Pair:
     """Return the two slots, the lower number first."""
     return (slot, other) if slot < other else (other, slot)
-
-
-def _passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
-    """Yield each slot that saw a point of a walk with a contact, and that point; `first` is the number of the first point.
-
-    Points without a contact close nothing: whether the robot turns round a corner is known when it is in touch again.
-    """
-    last: dict[int, SeenPoint] = {}
-    touch = TouchCounter()
-    stretch_of = stretches_of(walk)
-    stretches = list({each.first_number: each for each in stretch_of.values()}.values())
-    for number, point in enumerate(walk.points):
-        touch.take(number, point.walls, point.at_body, point.left_walls)
-        if point.is_blind:
-            continue
-        now = SeenPoint(number, point)
-        here = stretch_of.get(number)
-        for slot in point.seen:
-            number_of = -1 if here is None else first + here.first_number
-            if walk.origin is not None and slot == walk.origin.slot:  # it knows more of its own way: see `near_arcs`
-                yield slot, Passed(first + number, None, point, walk.hand, (), number_of)
-                continue
-            since = last[slot].number if slot in last else number
-            between = tuple(each.seen.keys() for each in walk.points[since:number] if slot not in each.seen)
-            before = point_before(slot, last.get(slot), now, touch.since, bool(between))
-            there = stretch_of.get(since) if before is not None else None
-            ends = () if here is None or there is None else (there.first, here.last)
-            pockets = tuple(pockets_beside(slot, number, point, stretches, first)) if slot in point.robots else ()
-            between = between if before is not None else ()
-            edges = tuple(sight_ends_at(slot, number, walk.points, walk.end))
-            yield slot, Passed(first + number, before, point, walk.hand, between, number_of, ends, pockets, edges)
-            last[slot] = now

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.fans import Pair, side_of
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import direction_of, touched_point
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, Walk, WalkPoint, arc_between
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, Origin, Walk, WalkPoint, arc_between
 
 Views = Mapping[int, Mapping[int, float]]
 
@@ -36,13 +36,28 @@ class WalkOrigins:
 
     def __init__(self) -> None:
         self._touched: dict[int, _Touched] = {}
+        self._origins: dict[int, Origin] = {}
+        self._slots: dict[int, None] = {}
+
+    def robots_at(self, occupants: Mapping[int, int]) -> dict[int, int]:
+        """Return the robots at the slots at which walks have begun."""
+        return {slot: occupants[slot] for slot in self._slots if slot in occupants}
+
+    def standing(self, number: int, point: WalkPoint, robots: Mapping[int, int]) -> WalkPoint:
+        """Return a point as if its origin had not seen it, if another robot stands there now."""
+        origin = self._origins.get(number)
+        if origin is None or robots.get(origin.slot) == origin.robot:
+            return point
+        return point.unseen_by((origin.slot,))
 
     def add(self, first: int, walk: Walk) -> None:
         """Take in a walk; `first` is the number of its first point."""
         if walk.origin is None:
             return
-        slot, place = walk.origin
+        slot, place, _ = walk.origin
+        self._slots[slot] = None
         for number, point in enumerate(walk.points, first):
+            self._origins[number] = walk.origin
             if slot in point.seen and point.walls:
                 walls = (touched_point(point.at, wall, walk.radius_m) for wall in point.walls)
                 directions = tuple(direction_of(place, each) for each in walls)

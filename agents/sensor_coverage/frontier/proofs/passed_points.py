@@ -1,0 +1,63 @@
+"""The points of a walk along a wall that each slot saw."""
+
+from collections.abc import Collection, Iterator
+from typing import NamedTuple
+
+from zwerm.agents.sensor_coverage.frontier.proofs.sight_ends import SightEnd, sight_ends_at
+from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import Pocket, StretchEnd
+from zwerm.agents.sensor_coverage.frontier.strips.stretches import pockets_beside, stretches_of
+from zwerm.agents.sensor_coverage.frontier.wall_proof import SeenPoint, TouchCounter, Walk, WalkPoint, point_before
+
+
+class Passed(NamedTuple):
+    """A point of a walk that a slot saw, the point before it if that closes an arc, and the hand at the wall.
+
+    `number` counts the points of all walks. The slot did not see the points between these two. Each of them was seen by
+    other slots. `stretch` is the number of the first point of the stretch of wall, and `ends` are the ends of the wall from the
+    point before to this one. `pockets` are set if the walking robot touched the slot's robot beside an end, each with the
+    number of the first point of its stretch. `sight_ends` are set where the slot did not see the next point.
+    """
+
+    number: int
+    before: WalkPoint | None
+    point: WalkPoint
+    hand: int
+    between: tuple[Collection[int], ...]
+    stretch: int = -1
+    ends: tuple[StretchEnd, ...] = ()
+    pockets: tuple[tuple[int, Pocket], ...] = ()
+    sight_ends: tuple[SightEnd, ...] = ()
+
+
+def passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
+    """Yield each slot that saw a point of a walk with a contact, and that point; `first` is the number of the first point.
+
+    Points without a contact close nothing: whether the robot turns round a corner is known when it is in touch again.
+    """
+    last: dict[int, SeenPoint] = {}
+    touch = TouchCounter()
+    stretch_of = stretches_of(walk)
+    stretches = list({each.first_number: each for each in stretch_of.values()}.values())
+    # No other slot relies on what the origin saw: that counts while its robot stands there.
+    others = walk.points if walk.origin is None else [each.unseen_by((walk.origin.slot,)) for each in walk.points]
+    for number, point in enumerate(walk.points):
+        touch.take(number, point.walls, point.at_body, point.left_walls)
+        if point.is_blind:
+            continue
+        now = SeenPoint(number, point)
+        here = stretch_of.get(number)
+        for slot in point.seen:
+            number_of = -1 if here is None else first + here.first_number
+            if walk.origin is not None and slot == walk.origin.slot:  # it knows more of its own way: see `near_arcs`
+                yield slot, Passed(first + number, None, point, walk.hand, (), number_of)
+                continue
+            since = last[slot].number if slot in last else number
+            between = tuple(each.seen.keys() for each in others[since:number] if slot not in each.seen)
+            before = point_before(slot, last.get(slot), now, touch.since, bool(between))
+            there = stretch_of.get(since) if before is not None else None
+            ends = () if here is None or there is None else (there.first, here.last)
+            pockets = tuple(pockets_beside(slot, number, point, stretches, first)) if slot in point.robots else ()
+            between = between if before is not None else ()
+            edges = tuple(sight_ends_at(slot, number, others, walk.end))
+            yield slot, Passed(first + number, before, point, walk.hand, between, number_of, ends, pockets, edges)
+            last[slot] = now
