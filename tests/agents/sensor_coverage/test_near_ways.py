@@ -77,14 +77,24 @@ def test_a_way_round_a_corner_closes_no_directions_past_the_corner() -> None:
 
 
 def open_at_slot(
-    origin: int | None, other: tuple[float, float] = OTHER, way: Way = WAY, lost_after: int = 99, robot_then: int = 0
+    origin: int | None,
+    other: tuple[float, float] = OTHER,
+    way: Way = WAY,
+    lost_after: int = 99,
+    robot_then: int = 0,
+    third: tuple[float, float] | None = None,
 ) -> list[Arc]:
-    """Return the open arcs of slot 0 after a way in sight of slot 1, which stands at a place [m], up to a point."""
-    there = math.atan2(other[1], other[0])
-    views = {0: {1: there}, 1: {0: there + math.pi}}
+    """Return the open arcs of slot 0 after a way in sight of slot 1, which stands at a place [m], up to a point.
+
+    A robot at a `third` place is in sight of both.
+    """
+    places = {0: SLOT, 1: other} | ({} if third is None else {2: third})
+    views = {
+        a: {b: math.atan2(y - places[a][1], x - places[a][0]) for b, (x, y) in places.items() if b != a} for a in places
+    }
     scan = ScanResult(views, FlagComplex({slot: set(seen) for slot, seen in views.items()}), ())
     slots = Slots()
-    for robot in (0, 1):
+    for robot in places:
         slots.occupant[robot], slots.heading[robot], slots.frame[robot] = robot, 0.0, 0
     waypoints = []
     for number, ((x, y), walls) in enumerate(way):
@@ -120,6 +130,12 @@ def test_another_robot_at_a_slot_does_not_know_the_walls_close_to_it() -> None:
     assert slots.take_replaced() == (4,)
     assert 4 not in slots.near
     assert slots.take_replaced() == ()
+
+
+def test_a_triangle_across_one_of_robots_closes_nothing() -> None:
+    """The third robot, at 165 degrees, is beyond the line from the other one to the point: that relies on slot 0 there."""
+    assert is_closed(open_at_slot(origin=0, way=WAY[2:], third=(-0.5, 0.13)), 160.0)
+    assert not is_closed(open_at_slot(origin=0, way=WAY[2:], third=(-0.5, 0.0)), 160.0), "on this side of the line"
 
 
 def test_a_triangle_with_a_robot_beside_the_point_closes_nothing() -> None:

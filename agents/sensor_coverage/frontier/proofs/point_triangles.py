@@ -73,10 +73,12 @@ class PointTriangles:
         versions: Mapping[int, int],
         at_walls: Beyond,
         close: Collection[Pair] = (),
+        origin: int | None = None,
     ) -> tuple[Pair, ...]:
         """Find the triangles with a point that count, each at its first slot; see `fan_of`.
 
-        `versions` count the changes of views. The triangles of the pairs `close` do not count.
+        `versions` count the changes of views. The triangles of the pairs `close` do not count. The walk began at the slot
+        `origin`.
         """
         basis = [(slot, versions[slot]) for slot in point.seen if slot in neighbours], at_walls, close
         if self._basis.get(number) == basis and not any(
@@ -87,7 +89,12 @@ class PointTriangles:
         hidden = dict.fromkeys(close)
         while True:
             pairs = fan_of(point, views, neighbours, at_walls, hidden)
-            more = [pair for pair in pairs if self._hides(pair, point, views, neighbours)]
+            more = [
+                pair
+                for pair in pairs
+                if self._hides(pair, point, views, neighbours)
+                or (pair[0] == origin and _crosses(pair, point, views, neighbours))
+            ]
             if not more:
                 self._pairs[number] = pairs
                 return pairs
@@ -125,3 +132,25 @@ class PointTriangles:
             known.sort(key=_DIRECTION)
             self._lost[slot, other] = len(points), known
         return known
+
+
+def _crosses(pair: Pair, point: WalkPoint, views: Views, neighbours: Mapping[int, Collection[int]]) -> bool:
+    """Return whether the line from the second slot to the point crosses a side of a triangle of robots with both slots.
+
+    The second slot relies on that triangle, and on the first slot for what is beyond this side. So the first does not rely on
+    the second.
+    """
+    slot, other = pair
+    here, there = views[slot], views[other]
+    return any(
+        _is_between(here[third], here[other], point.seen[slot])
+        and _is_between(point.seen[other], there[slot], there[third])
+        for third in neighbours[slot]
+        if third in neighbours[other]
+    )
+
+
+def _is_between(direction: float, a: float, b: float) -> bool:
+    """Return whether a direction [rad] lies within the smaller angle between two others, and not close to them."""
+    left, right = math.remainder(a - direction, math.tau), math.remainder(b - direction, math.tau)
+    return left * right < 0.0 and abs(left) + abs(right) < math.pi and min(abs(left), abs(right)) > HIDDEN_MIN_RAD

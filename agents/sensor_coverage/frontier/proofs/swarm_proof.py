@@ -327,8 +327,9 @@ class SwarmProof:
             return ()
         standing = [slot for slot in point.seen if slot in self._neighbours]
         at_walls = {(slot, side): self._ends_beyond(slot, number, side) for slot in standing for side in (1, -1)}
-        beside = self._origins.beside(number, self._scan.views)
-        return self._triangles.find(number, point, self._scan.views, self._neighbours, self._versions, at_walls, beside)
+        views, origins = self._scan.views, self._origins
+        beside, origin = origins.beside(number, views), origins.slot_of(number)
+        return self._triangles.find(number, point, views, self._neighbours, self._versions, at_walls, beside, origin)
 
     def _ends_beyond(self, slot: int, number: int, side: int) -> bool:
         """Return whether the wall that was followed at a point lies beyond the line of sight to it, on one side.
