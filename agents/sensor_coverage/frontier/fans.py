@@ -71,8 +71,8 @@ def _is_inside(
 ) -> bool:
     """Return whether a triangle of this slot and two others contains a point. One of these sees the point."""
     return any(
-        _between(point.seen[slot], views[slot][a], views[slot][b])
-        and _between(point.seen[a], views[a][slot], views[a][b])
+        is_between(point.seen[slot], views[slot][a], views[slot][b])
+        and is_between(point.seen[a], views[a][slot], views[a][b])
         for a in seen
         if a in neighbours[slot]
         for b in neighbours[slot]
@@ -80,7 +80,7 @@ def _is_inside(
     )
 
 
-def _between(there: float, a: float, b: float) -> bool:
-    """Return whether a direction [rad] lies within the smaller angle between two others."""
+def is_between(there: float, a: float, b: float, margin_rad: float = 0.0) -> bool:
+    """Return whether a direction [rad] lies within the smaller angle between two others, farther from both than a margin."""
     left, right = math.remainder(a - there, math.tau), math.remainder(b - there, math.tau)
-    return left * right < 0.0 and abs(left) + abs(right) < math.pi
+    return left * right < 0.0 and abs(left) + abs(right) < math.pi and min(abs(left), abs(right)) > margin_rad

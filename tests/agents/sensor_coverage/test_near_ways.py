@@ -155,8 +155,7 @@ def test_a_robot_that_loses_sight_of_a_way_straight_away_from_a_slot_is_not_reli
 
 def test_a_walk_keeps_the_slot_that_its_robot_left() -> None:
     slots = Slots()
-    slots.occupant[3] = slots.heading[8] = slots.frame[8] = 0
-    slots.occupant[3], slots.heading[8] = 8, 1.0
+    slots.occupant[3], slots.heading[8], slots.frame[8] = 8, 1.0, 0
     number = slots.take_walk(
         8,
         1,

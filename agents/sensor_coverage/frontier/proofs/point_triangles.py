@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterable, Mapping
 from operator import itemgetter
 from typing import Final
 
-from zwerm.agents.sensor_coverage.frontier.fans import Beyond, Pair, fan_of
+from zwerm.agents.sensor_coverage.frontier.fans import Beyond, Pair, fan_of, is_between
 from zwerm.agents.sensor_coverage.frontier.wall_proof import WalkPoint, arc_between
 
 # A point of a walk lies within a triangle's angle only if it is this far from its sides: bearings have noise.
@@ -143,14 +143,8 @@ def _crosses(pair: Pair, point: WalkPoint, views: Views, neighbours: Mapping[int
     slot, other = pair
     here, there = views[slot], views[other]
     return any(
-        _is_between(here[third], here[other], point.seen[slot])
-        and _is_between(point.seen[other], there[slot], there[third])
+        is_between(here[third], here[other], point.seen[slot], HIDDEN_MIN_RAD)
+        and is_between(point.seen[other], there[slot], there[third], HIDDEN_MIN_RAD)
         for third in neighbours[slot]
         if third in neighbours[other]
     )
-
-
-def _is_between(direction: float, a: float, b: float) -> bool:
-    """Return whether a direction [rad] lies within the smaller angle between two others, and not close to them."""
-    left, right = math.remainder(a - direction, math.tau), math.remainder(b - direction, math.tau)
-    return left * right < 0.0 and abs(left) + abs(right) < math.pi and min(abs(left), abs(right)) > HIDDEN_MIN_RAD

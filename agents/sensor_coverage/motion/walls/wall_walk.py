@@ -197,10 +197,7 @@ class WallWalk:
         while not is_past():
             if way_m > way_m_max or self._turned_rad > TURNS_RAD_MAX or stuck > WEDGED_TICKS:
                 return False
-            before, seen_before = motion.position, motion.frame.seen
-            yield self._step(way.hand)
-            self._check_contacts(before, seen_before)
-            step_m = math.dist(before, motion.position)
+            step_m = yield from self._advance(way.hand)
             way_m += step_m
             stuck = stuck + 1 if step_m < STUCK_FRACTION * motion.step_m else 0
             self._trail.append(motion.position)
@@ -276,10 +273,7 @@ class WallWalk:
                 return MET, way, kept
             if self._turned_rad > TURNS_RAD_MAX or stuck > WEDGED_TICKS:
                 return SHUT, way, kept
-            before, seen_before = motion.position, frame.seen
-            yield self._step(hand)
-            self._check_contacts(before, seen_before)
-            step_m = math.dist(before, motion.position)
+            step_m = yield from self._advance(hand)
             way += step_m
             stuck = stuck + 1 if step_m < STUCK_FRACTION * motion.step_m else 0
             if not self._sees(keep):
@@ -291,6 +285,13 @@ class WallWalk:
         return STRETCH, way, kept
 
     # --- one step ---------------------------------------------------------------------------------------------------
+
+    def _advance(self, hand: int) -> Generator[BodyVelocity, None, float]:
+        """Make one step along the wall, and return its length [m]."""
+        before, seen_before = self._motion.position, self._motion.frame.seen
+        yield self._step(hand)
+        self._check_contacts(before, seen_before)
+        return math.dist(before, self._motion.position)
 
     def _step(self, hand: int) -> BodyVelocity:
         """Return the velocity of the next step, and keep the direction of the wall."""
