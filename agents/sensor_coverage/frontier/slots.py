@@ -29,7 +29,7 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     Origin,
     Walk,
     WalkPoint,
-    drives_away,
+    leaves_wall,
     tail,
     turned_vector,
 )
@@ -229,7 +229,7 @@ class Slots:
                 tuple(bearing + heading for bearing in each.touched),
                 tuple(standing[node] for node in each.robots if node in standing),
                 any(node not in standing for node in each.robots),
-                drives_away(hand, before.touched, each.touched, each.x_m - before.x_m, each.y_m - before.y_m),
+                leaves_wall(hand, before.touched, each.touched, each.x_m - before.x_m, each.y_m - before.y_m),
                 (),
                 turned_vector((each.x_m, each.y_m), heading),
             )

@@ -87,7 +87,7 @@ class WalkPoint(NamedTuple):
     """A point of a walk: the direction [rad] to it from each slot that it sees, the directions of walls that it touches.
 
     `robots` are the slots that the walking robot touches. `at_body` is true if it touches a robot that stands at no slot.
-    `left_walls` is true if it drove away from all walls that it touched at the point before (`drives_away`).
+    `left_walls` is true if it does not follow the wall of the point before any more (`leaves_wall`).
     `unplaced` are the marks (`mark_of`) of robots that see the point, and of which no slot is known. `at` is the place [m] of
     the walking robot by its odometry, in the frame of the directions.
     """
@@ -209,7 +209,7 @@ class TouchCounter:
     a walk around a robot in an opening leads past the opening. A dead body may fill an opening that nobody keeps. So where a
     body is in touch, the robot follows the wall only as long as the same wall stays in touch, too. A robot that drives away
     from the wall, because it has turned round in front of a robot, does not follow it any more: the next wall that it touches
-    may be on the other side of a passage.
+    may be on the other side of a passage. Nor does one that turns into a passage, and touches its opposite wall first.
     """
 
     def __init__(self) -> None:
@@ -239,14 +239,18 @@ class TouchCounter:
         self._blind, self._walls, self._at_body = 0, walls, at_body
 
 
-def drives_away(hand: int, before: Collection[float], now: Collection[float], x_m: float, y_m: float) -> bool:
-    """Return whether a step (x, y) [m] leads away from all walls `before` it [rad]; `now` are the walls in touch after it.
+def leaves_wall(hand: int, before: Collection[float], now: Collection[float], x_m: float, y_m: float) -> bool:
+    """Return whether a robot with the wall at its `hand`, +1 left, -1 right, does not follow it any more on a step (x, y) [m].
 
-    The walking robot has the wall at its `hand`, +1 left, -1 right.
+    `before` and `now` are the directions [rad] of walls in touch before and after the step. The robot leaves the wall if it
+    drives away from all walls before it, or if it turns round a corner and comes to a wall at its other side alone. That is
+    the opposite wall of a passage that begins at the corner: the wall that it follows stays at its hand.
     """
-    if not before or not LEAVING_M_MIN < math.hypot(x_m, y_m) < LEAVING_M_MAX:
+    if not LEAVING_M_MIN < math.hypot(x_m, y_m) < LEAVING_M_MAX:
         return False
     heading = math.atan2(y_m, x_m)
+    if not before:
+        return bool(now) and all(hand * math.remainder(each - heading, math.tau) < 0.0 for each in now)
     stays = any(abs(math.remainder(a - b, math.tau)) < SAME_WALL_RAD for a in before for b in now)
     sides = [hand * math.remainder(each - heading, math.tau) for each in before]
     return not stays and not any(-LEAVING_RAD < each < ROUNDING_RAD for each in sides)

@@ -18,7 +18,7 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     Crossing,
     arc_between,
     arcs_into,
-    drives_away,
+    leaves_wall,
 )
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
 from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
@@ -105,7 +105,7 @@ def arcs_around(
     begins_clear = False
     for (before, was_in_sight), (point, is_in_sight) in pairwise(zip(points, in_sight, strict=True)):
         at_body = before.at_body or (at_body and not before.walls)
-        leaves = drives_away(hand, before.walls, point.walls, point.at[0] - before.at[0], point.at[1] - before.at[1])
+        leaves = leaves_wall(hand, before.walls, point.walls, point.at[0] - before.at[0], point.at[1] - before.at[1])
         same = [(a, b) for a in before.walls for b in point.walls if angle_between(a, b) < SAME_WALL_RAD]
         if not leaves and (same or (bool(before.walls or point.walls) and not (at_body or point.at_body))):
             begins_clear = begins_clear if stretch else not before.at_robot

@@ -18,7 +18,7 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     SeenPoint,
     WalkPoint,
     WallStep,
-    drives_away,
+    leaves_wall,
     mark_of,
     point_before,
     turned_vector,
@@ -164,7 +164,7 @@ class WallProtocol(Component):
         self._number += 1
         said_dead = self._situation.said_dead
         at_body = any(each not in local_map.states or each in said_dead for each in at.robots)
-        left = before is not None and drives_away(
+        left = before is not None and leaves_wall(
             self._hand, before.touched, at.touched, at.x_m - before.x_m, at.y_m - before.y_m
         )
         place = turned_vector((at.x_m, at.y_m), heading)

@@ -17,7 +17,7 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     Walk,
     WalkPoint,
     WallStep,
-    drives_away,
+    leaves_wall,
 )
 from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
 from zwerm.agents.sensor_coverage.protocols.walls.sightlines import RESENT_POINTS, Sightlines
@@ -331,8 +331,27 @@ def test_a_robot_that_drives_away_from_a_wall_does_not_follow_it(
     hand: int, wall_deg: float, way_deg: float, away: bool
 ) -> None:
     wall, way = math.radians(wall_deg), math.radians(way_deg)
-    assert drives_away(hand, (wall,), (), 0.05 * math.cos(way), 0.05 * math.sin(way)) is away
-    assert not drives_away(hand, (wall,), (wall,), 0.05 * math.cos(way), 0.05 * math.sin(way)), "it stays in touch"
+    assert leaves_wall(hand, (wall,), (), 0.05 * math.cos(way), 0.05 * math.sin(way)) is away
+    assert not leaves_wall(hand, (wall,), (wall,), 0.05 * math.cos(way), 0.05 * math.sin(way)), "it stays in touch"
+
+
+@pytest.mark.parametrize(
+    ("walls_deg", "leaves"),
+    [
+        pytest.param((80.0,), False, id="the wall goes on beyond the corner"),
+        pytest.param((20.0,), False, id="a wall ahead, on the side of the hand"),
+        pytest.param((-40.0,), True, id="the opposite corner of a door"),
+        pytest.param((-40.0, 50.0), False, id="both walls of a passage"),
+        pytest.param((), False, id="still round the corner"),
+    ],
+)
+@pytest.mark.parametrize("hand", [1, -1])
+def test_a_robot_that_turns_into_a_passage_does_not_follow_the_opposite_wall(
+    hand: int, walls_deg: tuple[float, ...], leaves: bool
+) -> None:
+    walls = [math.radians(hand * each) for each in walls_deg]
+    assert leaves_wall(hand, (), walls, 0.05, 0.0) is leaves
+    assert not leaves_wall(hand, (), walls, 0.0, 0.0), "it did not drive"
 
 
 @pytest.mark.parametrize(("left_walls", "open_deg"), [(False, 280), (True, 320)])
