@@ -78,8 +78,10 @@ def _chosen_of(known: Iterable[_KeptTriangle]) -> list[ProvedArc]:
 def _lead_round(a: _KeptTriangle, b: _KeptTriangle) -> bool:
     """Return whether two triangles cross, and a walk led from one point to the other, but not around the space between them."""
     wider, there = a.arc.width_rad - b.arc.width_rad, a.triangle.there_rad - b.triangle.there_rad
-    if wider * there >= -(EQUAL_RAD**2) or a.triangle.walk != b.triangle.walk:
+    if wider * there >= -(EQUAL_RAD**2):
         return False
+    if a.triangle.walk != b.triangle.walk:
+        return True
     later_is_wider = (a.triangle.number - b.triangle.number) * wider > 0.0
     return later_is_wider != (a.triangle.hand * a.triangle.side < 0)
 

@@ -53,9 +53,16 @@ def test_two_triangles_that_cross_count_if_the_walk_led_around_the_space_between
         assert list(chosen(*arcs).counting((BESIDE,))) == ([wide, narrow] if goes_round else [wide])
 
 
-def test_triangles_of_two_walks_and_on_both_sides_of_an_edge_count() -> None:
-    arcs = (triangle(1.2, 0.5, 9), triangle(0.4, 1.1, 1, walk=6), triangle(0.4, 1.1, 1, LEFT))
+def test_triangles_on_both_sides_of_an_edge_count() -> None:
+    arcs = (triangle(1.2, 0.5, 9), triangle(0.4, 1.1, 1, LEFT))
     assert list(chosen(*arcs).counting((BESIDE,))) == [*arcs]
+
+
+def test_of_two_triangles_that_cross_only_one_counts_if_no_walk_led_around_the_space_between() -> None:
+    """The points are of two walks: one may be in a passage, and the other one at the wall beside it."""
+    wide, narrow, inner = triangle(1.2, 0.5, 1), triangle(0.4, 1.1, 9, walk=6), triangle(0.3, 0.4, 9, walk=7, needed=())
+    assert list(chosen(wide, narrow, inner).counting((BESIDE,))) == [wide, inner]
+    assert list(chosen(wide, narrow._replace(start_rad=0.1), inner).counting(())) == [inner]
 
 
 def test_another_triangle_counts_when_a_slot_of_the_first_one_does_not_stand() -> None:
