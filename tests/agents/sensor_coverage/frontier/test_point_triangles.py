@@ -151,3 +151,25 @@ def test_a_flat_triangle_that_noise_turns_over_does_not_count_at_its_middle(
     views = {0: {1: 0.0}, 1: {0: math.pi}}
     at_walls = {(slot, side): True for slot in point.seen for side in (1, -1)}
     assert set(fan_of(point, views, {0: {1}, 1: {0}}, at_walls)) == counting
+
+
+@pytest.mark.parametrize(("closed", "counts"), [((1,), False), ((-1,), False), ((1, -1), True)])
+def test_a_triangle_that_noise_turns_over_counts_if_the_space_is_proved_on_both_sides(
+    closed: tuple[int, ...], counts: bool
+) -> None:
+    """The point is close to slot 0. Slot 1 sees both in nearly the same direction, and by noise in the wrong order."""
+    point = WalkPoint({0: math.pi / 2.0, 1: math.pi + 0.01}, (0.0,), ())
+    views = {0: {1: 0.0}, 1: {0: math.pi}}
+    at_walls = {(0, 1): True, (0, -1): True} | {(1, side): True for side in closed}
+    exact = point._replace(seen={0: math.pi / 2.0, 1: math.pi - 0.01})
+    assert bool(fan_of(exact, views, {0: {1}, 1: {0}}, at_walls)) is (-1 in closed), "the side beyond the point"
+    assert bool(fan_of(point, views, {0: {1}, 1: {0}}, at_walls)) is counts
+
+
+@pytest.mark.parametrize(("inside_rad", "counts"), [(0.02, False), (0.2, True)])
+def test_a_point_on_a_side_of_a_triangle_of_robots_is_not_inside_it(inside_rad: float, counts: bool) -> None:
+    """Slots 0, 1 and 2 see each other, slots 0 and 1 see the point. Beyond it nothing is proved."""
+    point = WalkPoint({0: inside_rad, 1: math.pi - inside_rad}, (), ())
+    views = {0: {1: 0.0, 2: 1.0}, 1: {0: math.pi, 2: 2.1}, 2: {0: -2.1, 1: -1.0}}
+    neighbours = {a: set(seen) for a, seen in views.items()}
+    assert bool(fan_of(point, views, neighbours, {})) is counts

@@ -13,6 +13,7 @@ ALONE = (EXACT, "services.path=gradient")
         pytest.param(5, True, (*ALONE, NOISE), id="noise, a body in a bend of 1.3 bodies"),
         pytest.param(13, True, ALONE, id="a body in a door of 1.8 bodies"),
         pytest.param(112, True, ALONE, id="a body in a corner of 1.5 bodies between two walks"),
+        pytest.param(504, True, (*ALONE, NOISE), id="noise, triangles that cross in front of a bend of 1.4 bodies"),
         pytest.param(38, False, ALONE, id="a robot in a door beside which another one touched the wall"),
     ],
 )
