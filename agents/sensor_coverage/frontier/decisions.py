@@ -13,6 +13,7 @@ from zwerm.agents.sensor_coverage.frontier.paths import CheapestRoutes
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStretch
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, Walk, WallStep
+from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.agents.sensor_coverage.messages.pushes import ProvedArc
 from zwerm.maths.simplicial import Edge, FlagComplex
 
@@ -67,14 +68,27 @@ class SlotCoverageProof(Protocol):
     def open_arcs(self) -> list[Arc]:
         """Return the arcs that nothing closes."""
 
-    def pass_step(self, walk: int, earlier: WallStep | None, step: WallStep, stretch: FollowedStretch | None) -> bool:
-        """Take in a step of a walk whose end this slot sees, and the step before; return whether the open arcs are smaller."""
+    def pass_step(
+        self,
+        walk: int,
+        earlier: WallStep | None,
+        step: WallStep,
+        stretch: FollowedStretch | None,
+        hidden: Sequence[tuple[int, ...]] = (),
+    ) -> bool:
+        """Take in a step of a walk whose end this slot sees, and the step before; return whether the open arcs are smaller.
+
+        `hidden` has the slots that saw the walk where this slot did not, until now.
+        """
+
+    def lose_sight(self, walk: int, number: int, witnesses: Iterable[int]) -> None:
+        """Record that this slot does not see the point of a walk with this number, and which slots see it."""
 
     def extend(self, walk: int, stretch: FollowedStretch) -> bool:
         """Take in how far a stretch of wall was followed; return whether this slot saw a part of it, and it is news."""
 
-    def end_walk(self, walk: int) -> None:
-        """Keep the arcs that a walk has closed, but not its steps: it is over."""
+    def end_walk(self, walk: int, last_number: int = 0, end: int = NOWHERE) -> None:
+        """Keep the arcs that a walk has closed, but not its steps: it is over. The walking robot stands at the slot `end`."""
 
     def accept(self, proved: ProvedArc) -> bool:
         """Take in an arc that a neighbour has proved; return whether the open arcs are smaller."""
@@ -88,8 +102,15 @@ class SlotCoverageProof(Protocol):
     def memory(self) -> tuple[ProvedArc, ...]:
         """Return the arcs that walks closed, for the slot's next occupant."""
 
-    def inherit(self, memory: Iterable[ProvedArc]) -> None:
-        """Take over the arcs that walks closed from the slot's former occupant."""
+    def edges(self) -> tuple[tuple[float, tuple[int, ...], tuple[int, ...]], ...]:
+        """Return the edges of sight, for the slot's next occupant."""
+
+    def inherit(
+        self,
+        memory: Iterable[ProvedArc],
+        edges: Iterable[tuple[float, tuple[int, ...], tuple[int, ...]]] = (),
+    ) -> None:
+        """Take over the arcs that walks closed, and the edges of sight, from the slot's former occupant."""
 
 
 class WallService(Protocol):

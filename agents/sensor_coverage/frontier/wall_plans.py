@@ -10,8 +10,8 @@ from typing import Final
 from zwerm.agents.sensor_coverage.frontier.decisions import CoverageProof
 from zwerm.agents.sensor_coverage.frontier.plan import WALLS, Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
-from zwerm.agents.sensor_coverage.frontier.proofs.sight_ends import united_round
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
+from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import united_round
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, contains
 
 # Fourth element of the keys of plans to join two parts of the swarm.

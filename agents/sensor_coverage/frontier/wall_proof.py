@@ -298,11 +298,21 @@ def arcs_of_step(slot: int, before: WalkPoint | None, point: WalkPoint, hand: in
     there = point.seen[slot]
     if before is not None and slot in before.seen and not (before.passes_robots or point.passes_robots):
         step = math.remainder(there - before.seen[slot], math.tau)
-        if step * hand < 0.0:  # the slot and the wall are on different sides of the step
+        # The slot and the wall are on different sides of the step, by the odometry, too: a bearing has more noise than a step.
+        if step * hand < 0.0 and _passes_by(before, point, there) * hand <= 0.0:
             yield arc_between(before.seen[slot], there)
     if slot in point.robots and point.walls:
         off = min((math.remainder(each - there, math.tau) for each in point.walls), key=abs)
         yield arc_between(there, there + math.copysign(min(abs(off), POCKET_RAD), off))
+
+
+def _passes_by(before: WalkPoint, point: WalkPoint, there: float) -> float:
+    """Return a number with the sign of the turn to the left by which a step is seen in a direction [rad], by the odometry.
+
+    It is 0 if the robot did not move.
+    """
+    x_m, y_m = point.at[0] - before.at[0], point.at[1] - before.at[1]
+    return y_m * math.cos(there) - x_m * math.sin(there)
 
 
 def arc_between(a_rad: float, b_rad: float) -> Arc:

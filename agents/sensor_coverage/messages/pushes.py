@@ -72,6 +72,8 @@ class SlotMemory(_PushMessagePart, frozen=True):
     `claims` is the number of its newest claim. `obstructed` has (key of an attempt, dead robot whose body stopped it).
     `explored` are directions [rad] of attempts to follow a wall, and `probed` those of probes of walls close by.
     `proved` has the arcs that walks closed. `distances_m` has (neighbouring slot, distance [m]) where a walk measured it.
+    `edges` has directions [rad] in which the slot lost sight of a walk, or saw it first, with the slots that saw it beyond, and
+    the slots that saw it there.
     """
 
     slot: int
@@ -87,6 +89,7 @@ class SlotMemory(_PushMessagePart, frozen=True):
     proved: tuple[ProvedArc, ...] = ()
     distances_m: tuple[tuple[int, float], ...] = ()
     probed: tuple[float, ...] = ()
+    edges: tuple[tuple[float, tuple[int, ...], tuple[int, ...]], ...] = ()
 
 
 # The robots of a push, rear to front, each as (slot before the push, robot).

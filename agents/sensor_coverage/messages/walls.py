@@ -42,7 +42,8 @@ class PassedPoint(_WalkMessage, frozen=True, tag="passed"):
     `seen` has (robot, direction [rad] from that robot to the point). `walls` are directions of touched walls, and
     `robots` touched robots. The walking robot follows the wall since the point with the number `touch_since`.
     `at` is its place [m], and `stretch` the latest stretch of wall. `hidden` has, for each robot that sees the walking robot
-    again, the number of the last point that it saw before, and for the points between the robots that saw them.
+    again, the number of the last point that it saw before, and for the points between the robots that saw them. For a robot
+    that sees it for the first time, it has 0, and the robots that saw the point before.
     """
 
     push: int

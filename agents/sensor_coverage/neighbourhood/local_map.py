@@ -114,6 +114,7 @@ class LocalMap(NeighbourTable):
             self.proof.memory(),
             tuple(self.distances_m.items()),
             tuple(self._planner.walls.probed.get(me, ())),
+            self.proof.edges(),
         )
 
     def reopen(self) -> None:
@@ -197,7 +198,7 @@ class LocalMap(NeighbourTable):
         log.blocked[me] = list(memory.blocked)
         self._bodies.stopped = dict(memory.obstructed)
         self._planner.walls.tried[me], self._planner.walls.probed[me] = list(memory.explored), list(memory.probed)
-        self.proof.inherit(memory.proved)
+        self.proof.inherit(memory.proved, memory.edges)
         self.distances_m = dict(memory.distances_m)
 
     def leave_complex(self) -> None:

@@ -6,7 +6,7 @@ from typing import cast
 
 import pytest
 
-from zwerm.agents.sensor_coverage.frontier.proofs.sight_ends import united_round
+from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import united_round
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, ends_at, united
 from zwerm.agents.sensor_coverage.messages.commands import OPEN, SHUT, STRETCH, Sighting, Waypoint
 from zwerm.agents.sensor_coverage.motion.locomotion import Locomotion

@@ -29,8 +29,8 @@ class ChosenTriangles:
 
     Two triangles with different points may cross. If one slot relied on one of them and its neighbour on the other, each
     would be responsible for space between the two points that neither sees. It has a wall around it if the walk led from one
-    point to the other around this space. If the same walk led round the other way, only the triangle with the larger sum
-    of its angles at the two slots counts, which both know. Points of different walks are not compared.
+    point to the other around this space. If it led round the other way, or the points are of different walks, only the
+    triangle with the larger sum of its angles at the two slots counts, which both know.
     """
 
     def __init__(self) -> None:
@@ -70,13 +70,13 @@ def _chosen_of(known: Iterable[_KeptTriangle]) -> list[ProvedArc]:
     """Return the arcs of triangles that count together, by falling rank."""
     chosen = list[_KeptTriangle]()
     for each in known:
-        if not any(_lead_round(each, one) for one in chosen):
+        if not any(_exclude(each, one) for one in chosen):
             chosen.append(each)
     return [each.arc for each in chosen]
 
 
-def _lead_round(a: _KeptTriangle, b: _KeptTriangle) -> bool:
-    """Return whether two triangles cross, and a walk led from one point to the other, but not around the space between them."""
+def _exclude(a: _KeptTriangle, b: _KeptTriangle) -> bool:
+    """Return whether two triangles cross, and no walk led from one point to the other around the space between them."""
     wider, there = a.arc.width_rad - b.arc.width_rad, a.triangle.there_rad - b.triangle.there_rad
     if wider * there >= -(EQUAL_RAD**2):
         return False

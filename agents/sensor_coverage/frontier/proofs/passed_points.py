@@ -3,8 +3,8 @@
 from collections.abc import Collection, Iterator
 from typing import NamedTuple
 
-from zwerm.agents.sensor_coverage.frontier.proofs.sight_ends import SightEnd, sight_ends_at
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import Pocket, StretchEnd
+from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import SightEnd, sight_ends_at
 from zwerm.agents.sensor_coverage.frontier.strips.stretches import pockets_beside, stretches_of
 from zwerm.agents.sensor_coverage.frontier.wall_proof import SeenPoint, TouchCounter, Walk, WalkPoint, point_before
 

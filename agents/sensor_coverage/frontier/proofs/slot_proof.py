@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import chain
-from typing import Final
+from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.fans import fan_of, side_of
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
@@ -10,6 +10,12 @@ from zwerm.agents.sensor_coverage.frontier.proofs.chosen_triangles import Chosen
 from zwerm.agents.sensor_coverage.frontier.proofs.walk_arcs import WalkArcs
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStretch
 from zwerm.agents.sensor_coverage.frontier.strips.seen_stretch import SeenStep, SeenStretch, SeenTouch
+from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import (
+    SightEnd,
+    united_round,
+    within_ends,
+    without_edges,
+)
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     BLIND_MAX,
     CONTACT_RAD,
@@ -23,6 +29,7 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     arcs_of_walls,
     complement,
     ends_at,
+    united,
 )
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.agents.sensor_coverage.messages.pushes import ProvedArc, WalkTriangle
@@ -35,6 +42,24 @@ MEMORY_BYTES_MAX: Final = 45_000
 # Greatest length of an arc and its triangle in a message, without its slots, and that of a slot.
 ARC_BYTES: Final = 60
 SLOT_BYTES: Final = 5
+# Edges of sight that a slot's next occupant learns, and the most slots named in each: witnesses, and slots that saw the walk.
+EDGES_MAX: Final = 40
+EDGE_SLOTS_MAX: Final = 8
+# What an arc that the slot's own robot followed close to it depends on: no other slot. It is not the same as a walk that no
+# other slot saw.
+NEAR: Final[tuple[tuple[int, ...], tuple[int, ...]]] = ((), (NOWHERE,))
+
+# A direction in which a slot lost sight of a walk, or saw it first, in messages; see `SightEnd`.
+Edge = tuple[float, tuple[int, ...], tuple[int, ...]]
+
+
+class _Sight(NamedTuple):
+    """The latest point of a walk that a slot sees: its number, its direction [rad], the slots that saw it, its stretch."""
+
+    number: int
+    direction_rad: float
+    seen: tuple[int, ...]
+    stretch: SeenStretch | None
 
 
 class SlotProof:
@@ -55,8 +80,11 @@ class SlotProof:
         self._touched: tuple[float, ...] = ()
         self._at_walls: list[Arc] = []  # arcs of walls in touch
         self._contacts: list[Arc] = []  # the directions of their contacts
+        self._near: list[Arc] = []  # arcs in which a wall close to the slot was followed
         self._by_walks = WalkArcs()
         self._triangles = ChosenTriangles()
+        self._edges: dict[SightEnd, None] = {}
+        self._sights: dict[int, _Sight] = {}  # by walk, until the slot loses sight of it
         self._stretches: dict[tuple[int, int], SeenStretch] = {}  # by walk, and the number of their first point
         self._touches: dict[int, list[SeenTouch]] = {}  # by walk: the latest contacts with this slot's robot
         # Arcs that end at the stretch of wall up to the latest point, seen without a break, as if its ends were tied.
@@ -72,7 +100,7 @@ class SlotProof:
     @property
     def knows_walks(self) -> bool:
         """True once walks have closed an arc of the slot."""
-        return any(True for _ in chain(self._stretches, self._by_walks.all(), self._triangles.all()))
+        return any(True for _ in chain(self._stretches, self._near, self._by_walks.all(), self._triangles.all()))
 
     def update(self, slot: int, scan: ScanResult, touched: Iterable[float], in_touch: Collection[int] = ()) -> None:
         """Take in the slot's view and the complex around it, the directions [rad] of walls in touch, and the slots in touch."""
@@ -94,22 +122,37 @@ class SlotProof:
         return self._open
 
     def _find_open(self) -> list[Arc]:
-        standing = self._scan.complex_.neighbours
-        walks = [
-            *self._by_walks.counting(standing),
-            *(Arc(each.start_rad, each.width_rad) for each in self._triangles.counting(standing)),
-        ]
-        followed = [arc for each in self._stretches.values() for arc in each.arcs(standing, self._touched)]
-        return complement([*self._by_view, *self._at_walls, *walks, *followed])
+        standing, touched, stretches = self._scan.complex_.neighbours, self._touched, self._stretches.values()
+        fans = [Arc(each.start_rad, each.width_rad) for each in self._triangles.counting(standing)]
+        followed = [arc for each in stretches for arc in each.arcs(standing, touched)]
+        walks = self._by_walks.counting({*standing, NOWHERE})
+        opened = complement([*self._by_view, *fans, *self._at_walls, *self._near, *walks, *followed])
+        if opened:  # edges of sight are left until all else is closed: many of them are seen from close by meanwhile
+            return opened
+        # A station cannot look behind what it touches. Nobody saw how a wall close to the slot goes on at the ends of its arc.
+        contacts = self._at_walls if self._slot == 0 else self._contacts
+        near = [within_ends(each) for each in united_round(self._near)]
+        loose = [each for each in self._edges if not each.witnesses]
+        edged = [arc for each in stretches for arc in each.edged_arcs(standing, touched)]
+        edged += without_edges([*contacts, *near], loose)
+        return complement([*self._by_view, *fans, *self._by_walks.counting(standing), *edged])
 
     def _open_rad(self) -> float:
         """Return the sum of all open arcs [rad]."""
         return added(each.width_rad for each in self.open_arcs())
 
-    def pass_step(self, walk: int, earlier: WallStep | None, step: WallStep, stretch: FollowedStretch | None) -> bool:
+    def pass_step(
+        self,
+        walk: int,
+        earlier: WallStep | None,
+        step: WallStep,
+        stretch: FollowedStretch | None,
+        hidden: Sequence[tuple[int, ...]] = (),
+    ) -> bool:
         """Take in a step of a walk whose end this slot sees, and the step before; return whether the open arcs are smaller.
 
-        `stretch` is the stretch of wall that the robot follows, if it has met a wall.
+        `stretch` is the stretch of wall that the robot follows, if it has met a wall. `hidden` has the slots that saw the walk
+        where this slot did not, until now.
         """
         old, self._open = self._open_rad(), None
         slot, (before, point, hand, witnesses, number) = self._slot, step
@@ -117,14 +160,21 @@ class SlotProof:
             self._stretch = []
         self._stretch += arcs_of_step(slot, before, point, hand)
         self._stretch_end = point
+        if hidden:
+            self._lose_sight(walk, hidden[0])
+        seen_stretch = None
         if stretch is not None:
             seen_stretch = self._stretch_of(walk, hand, stretch)
             seen_stretch.extend(stretch)
             if before is not None and (earlier is None or earlier.number >= stretch.first_number):
                 saw_both = self._others((*witnesses, *_witnesses_of(point), *_witnesses_of(before)))
                 seen_stretch.add(SeenStep(before, point, self._others(witnesses), saw_both))
+        seen = self._others(_witnesses_of(point))
+        self._sights[walk] = _Sight(number, point.seen[slot], seen, seen_stretch)
+        if hidden:
+            self._add_edge(self._sights[walk], hidden[-1])
         if slot in point.robots:
-            touch = SeenTouch(number, point, self._others(_witnesses_of(point)))
+            touch = SeenTouch(number, point, seen)
             self._touches[walk] = [*self._touches.get(walk, ())[-BLIND_MAX:], touch]
             for (its_walk, _), each in self._stretches.items():
                 if its_walk == walk and number <= each.stretch.last_number + BLIND_MAX:
@@ -154,9 +204,35 @@ class SlotProof:
         self._open = None
         return True
 
-    def end_walk(self, walk: int) -> None:
-        """Keep the arcs that a walk has closed, but not its steps: it is over."""
+    def lose_sight(self, walk: int, number: int, witnesses: Iterable[int]) -> None:
+        """Record that this slot does not see the point of a walk with this number, and which slots see it."""
+        sight = self._sights.get(walk)
+        if sight is not None and sight.number < number:
+            self._lose_sight(walk, witnesses)
+
+    def _lose_sight(self, walk: int, witnesses: Iterable[int]) -> None:
+        sight = self._sights.pop(walk, None)
+        if sight is not None:
+            self._add_edge(sight, witnesses)
+
+    def _add_edge(self, sight: _Sight, witnesses: Iterable[int]) -> None:
+        """Add an edge of sight beside a point that this slot saw."""
         self._open = None
+        edge = SightEnd(sight.direction_rad, self._others(witnesses), sight.seen)
+        self._edges[edge] = None
+        if sight.stretch is not None:
+            sight.stretch.add_edge(edge)
+
+    def end_walk(self, walk: int, last_number: int = 0, end: int = NOWHERE) -> None:
+        """Keep the arcs that a walk has closed, but not its steps: it is over.
+
+        The point with the number `last_number` was its last one at a wall. The walking robot stands at the slot `end`.
+        """
+        self._open = None
+        sight = self._sights.get(walk)
+        if sight is not None and (end != NOWHERE or sight.number + BLIND_MAX < last_number):
+            self._lose_sight(walk, () if end == NOWHERE else (end,))
+        self._sights.pop(walk, None)
         self._touches.pop(walk, None)
         for key in [each for each in self._stretches if each[0] == walk]:
             for needed, seen, arc in self._stretches.pop(key).keyed_arcs(self._touched):
@@ -181,7 +257,7 @@ class SlotProof:
                 for arc in arcs_of_step(each, step.before, step.point, step.hand)
             ]
             if each == slot:
-                walls += [*self._stretch, *self._contacts, *self._by_walks.unconditional()]
+                walls += [*self._stretch, *self._contacts, *self._near, *self._by_walks.unconditional()]
             for side in (1, -1):
                 at_walls[each, side] = ends_at(walls, point.seen[each], side)
         counting = fan_of(point, views, neighbours, at_walls)
@@ -215,7 +291,9 @@ class SlotProof:
     def _take(self, proved: ProvedArc) -> None:
         """Take in an arc from another robot."""
         needed, seen = self._others(proved.needed), self._others(proved.seen)
-        if proved.triangle is None:
+        if (needed, seen) == NEAR:
+            self.add_near([(proved.start_rad, proved.width_rad)])
+        elif proved.triangle is None:
             self._add(needed, seen, Arc(proved.start_rad, proved.width_rad))
         else:
             self._open = None
@@ -227,8 +305,8 @@ class SlotProof:
         self._by_walks.add((self._others(needed), self._others(seen)), arc)
 
     def _others(self, slots: Iterable[int]) -> tuple[int, ...]:
-        """Return slots without this one, each once, ascending."""
-        return tuple(sorted(dict.fromkeys(each for each in slots if each != self._slot)))
+        """Return slots without this one, each once, ascending. NOWHERE stays: it is no slot, also before this one is known."""
+        return tuple(sorted(dict.fromkeys(each for each in slots if each == NOWHERE or each != self._slot)))
 
     def lose(self, *slots: int) -> None:
         """Forget the arcs of walks that one of these slots saw: its robot has died or left, and no robot takes it over.
@@ -238,6 +316,7 @@ class SlotProof:
         self._open = None
         self._by_walks.lose(slots)
         self._triangles.lose(slots)
+        self._edges = {left: None for each in self._edges if (left := each.without(slots)) is not None}
         for stretch in self._stretches.values():
             stretch.lose(slots)
         for walk, touches in self._touches.items():
@@ -245,15 +324,21 @@ class SlotProof:
 
     def add_near(self, arcs: Iterable[tuple[float, float]]) -> None:
         """Add arcs (start, width) [rad] in which a wall close to the slot was followed."""
-        for each in arcs:
-            self._add((), (), Arc(*each))
+        self._open = None
+        self._near = united([*self._near, *(Arc(*each) for each in arcs)])
+
+    def edges(self) -> tuple[Edge, ...]:
+        """Return the edges of sight, for the slot's next occupant: the latest ones, as far as they name few slots."""
+        latest = list(self._edges)[-EDGES_MAX:]
+        return tuple((there, saw[:EDGE_SLOTS_MAX], seen[:EDGE_SLOTS_MAX]) for there, saw, seen in latest)
 
     def memory(self) -> tuple[ProvedArc, ...]:
         """Return the arcs that walks closed, for the slot's next occupant: of many those that rely on few slots."""
+        near = (ProvedArc(*NEAR, *arc) for arc in self._near)
         kept = (ProvedArc(*key, *arc) for key, arc in self._by_walks.all())
         followed = (arc for each in self._stretches.values() for arc in each.keyed_arcs(self._touched))
         ended = (ProvedArc(self._others(needed), self._others(seen), *arc) for needed, seen, arc in followed)
-        found = (*kept, *self._triangles.all(), *ended)
+        found = (*near, *kept, *self._triangles.all(), *ended)
         if len(found) <= MEMORY_MAX and _bytes_of(found) <= MEMORY_BYTES_MAX:
             return found
         found = tuple(sorted(found, key=lambda each: len(each.needed) + len(each.seen))[:MEMORY_MAX])
@@ -261,11 +346,12 @@ class SlotProof:
             found = found[:-1]
         return found
 
-    def inherit(self, memory: Iterable[ProvedArc]) -> None:
-        """Take over the arcs that walks closed from the slot's former occupant."""
+    def inherit(self, memory: Iterable[ProvedArc], edges: Iterable[Edge] = ()) -> None:
+        """Take over the arcs that walks closed, and the edges of sight, from the slot's former occupant."""
         self._open = None
-        self._by_walks, self._triangles = WalkArcs(), ChosenTriangles()
-        self._stretches, self._touches = {}, {}
+        self._near, self._by_walks, self._triangles = [], WalkArcs(), ChosenTriangles()
+        self._stretches, self._touches, self._sights = {}, {}, {}
+        self._edges = {SightEnd(*each): None for each in edges}
         for each in memory:
             self._take(each)
 

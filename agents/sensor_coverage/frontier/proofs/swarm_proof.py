@@ -14,12 +14,6 @@ from zwerm.agents.sensor_coverage.frontier.fans import Pair, side_of
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.frontier.proofs.passed_points import Passed, passes
 from zwerm.agents.sensor_coverage.frontier.proofs.point_triangles import PointTriangles
-from zwerm.agents.sensor_coverage.frontier.proofs.sight_ends import (
-    SightEnd,
-    shortened,
-    with_islands,
-    without_edges,
-)
 from zwerm.agents.sensor_coverage.frontier.proofs.walk_origins import WalkOrigins
 from zwerm.agents.sensor_coverage.frontier.strips.crossings import (
     arcs_beside_pocket,
@@ -27,6 +21,12 @@ from zwerm.agents.sensor_coverage.frontier.strips.crossings import (
     crossings_of_step,
 )
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import Pocket
+from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import (
+    SightEnd,
+    shortened,
+    with_islands,
+    without_edges,
+)
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     CONTACT_RAD,
     Arc,

@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Iterable, Iterator
 from itertools import product
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.strips.crossings import (
     arcs_beside_pocket,
@@ -10,8 +10,20 @@ from zwerm.agents.sensor_coverage.frontier.strips.crossings import (
     crossings_of_step,
 )
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStretch, Pocket, StretchEnd
+from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import SightEnd, beside_edge, without_edges
 from zwerm.agents.sensor_coverage.frontier.strips.stretches import pocket_of
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, Crossing, WalkPoint, arcs_into, overlap
+from zwerm.agents.sensor_coverage.frontier.wall_proof import (
+    Arc,
+    Crossing,
+    WalkPoint,
+    arcs_into,
+    overlap,
+    shared_arcs,
+)
+from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
+
+# Slots that saw a walk beyond an edge of sight, and are named once the walk is over.
+WITNESSES_MAX: Final = 1
 
 
 class SeenStep(NamedTuple):
@@ -32,7 +44,11 @@ class SeenTouch(NamedTuple):
 
 
 class KeyedArc(NamedTuple):
-    """An arc that is closed while the slots `needed` stand, until one of the slots `seen` is lost."""
+    """An arc that is closed while the slots `needed` stand, until one of the slots `seen` is lost.
+
+    Beside an edge of sight it counts until the slot is lost that saw what is beyond. As NOWHERE never stands, an arc that
+    needs it counts only if no edge of sight does (see `sight_ends.with_islands`).
+    """
 
     needed: tuple[int, ...]
     seen: tuple[int, ...]
@@ -56,6 +72,7 @@ class SeenStretch:
         self._slot, self._hand, self._before = slot, hand, before
         self._steps: list[SeenStep] = []
         self._touches: list[SeenTouch] = []
+        self._edges: list[SightEnd] = []
         self._arcs: tuple[object, list[Arc]] | None = None
 
     def extend(self, stretch: FollowedStretch) -> bool:
@@ -79,8 +96,13 @@ class SeenStretch:
         self._touches.append(touch)
         self._arcs = None
 
+    def add_edge(self, edge: SightEnd) -> None:
+        """Take in a direction in which the slot lost sight of the walking robot, or saw it first."""
+        self._edges.append(edge)
+
     def lose(self, slots: Collection[int]) -> None:
         """Forget the points that one of these slots saw."""
+        self._edges = [left for each in self._edges if (left := each.without(slots)) is not None]
         self._steps = [each for each in self._steps if not any(slot in each.seen for slot in slots)]
         self._touches = [each for each in self._touches if not any(slot in each.seen for slot in slots)]
         self._arcs = None
@@ -96,11 +118,20 @@ class SeenStretch:
             self._arcs = basis, [*closed, *(each.arc for each in self._beside_pockets(contacts))]
         return self._arcs[1]
 
+    def edged_arcs(self, standing: Collection[int], contacts: tuple[float, ...] = ()) -> list[Arc]:
+        """Return the arcs that are closed while these slots stand, without the directions beside loose edges of sight."""
+        return without_edges(self.arcs(standing, contacts), (each for each in self._edges if not each.witnesses))
+
     def keyed_arcs(self, contacts: Collection[float] = ()) -> Iterator[KeyedArc]:
         """Yield the arcs that are closed, with what they depend on: also on the slots that tie the ends.
 
         `contacts` are directions [rad] of walls in touch.
         """
+        for each in self._keyed_arcs(contacts):
+            yield from _divided(each, self._edges)
+
+    def _keyed_arcs(self, contacts: Collection[float]) -> Iterator[KeyedArc]:
+        """Yield the arcs that are closed, as if no edge of sight was loose."""
         ends = self._ends()
         for ties in product(*((None, *each.ties) for each in ends)):
             crossed = list(self._crossed([end for end, slot in zip(ends, ties, strict=True) if slot is None]))
@@ -140,6 +171,21 @@ class SeenStretch:
         for pocket, seen in self._pockets():
             for arc in arcs_beside_pocket(self._hand, pocket, contacts):
                 yield KeyedArc((), seen, arc)
+
+
+def _divided(keyed: KeyedArc, edges: Iterable[SightEnd]) -> list[KeyedArc]:
+    """Return the parts of an arc: beside an edge of sight they count until its witness is lost, or need NOWHERE."""
+    parts = [keyed]
+    for edge in edges:
+        divided = list[KeyedArc]()
+        for needed, seen, arc in parts:
+            divided += (KeyedArc(needed, seen, each) for each in without_edges([arc], [edge]))
+            for each in shared_arcs(arc, beside_edge(edge)):
+                divided.append(KeyedArc(_union(needed, (NOWHERE,)), seen, each))
+                if NOWHERE not in needed:
+                    divided += (KeyedArc(needed, _union(seen, (one,)), each) for one in edge.witnesses[:WITNESSES_MAX])
+        parts = divided
+    return parts
 
 
 def _merged(old: StretchEnd, new: StretchEnd) -> StretchEnd:

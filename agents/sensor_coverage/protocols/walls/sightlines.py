@@ -9,7 +9,10 @@ RESENT_POINTS: Final = 10
 
 
 class _Hidden(NamedTuple):
-    """A robot sees the walking robot again at the point `number`, after `last`; and the robots that saw the points between."""
+    """A robot sees the walking robot again at the point `number`, after `last`; and the robots that saw the points between.
+
+    If it never saw the walking robot before, `last` is 0, and only the latest of these points counts.
+    """
 
     number: int
     last: int
@@ -32,6 +35,8 @@ class Sightlines:
                 # Points that are forgotten were seen by nobody, as far as is known.
                 between = [self._seen.get(each, ()) for each in range(last + 1, number)]
                 self._hidden[node] = _Hidden(number, last, tuple(dict.fromkeys(between)))
+            elif last is None and number > 1:
+                self._hidden[node] = _Hidden(number, 0, (self._seen.get(number - 1, ()),))
             self._last[node] = number
         self._seen[number] = seen
         self._seen.pop(number - REMEMBERED_POINTS, None)

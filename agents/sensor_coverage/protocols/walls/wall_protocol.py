@@ -6,7 +6,7 @@ walking robot is out of range of its push by then. A lost message leaves an arc 
 """
 
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import ClassVar, Final, NamedTuple, Protocol
 
 from zwerm.agents.sensor_coverage.frontier.decisions import SlotCoverageProof
@@ -260,11 +260,14 @@ class WallProtocol(Component):
         stretch = None if passed.stretch is None else _stretch_of(passed.stretch, slots)
         if stretch is not None:
             local_map.proof.extend(passed.push, stretch)
+        if slot not in point.seen:
+            local_map.proof.lose_sight(passed.push, passed.number, self._occupied(node for node, _ in passed.seen))
         if slot not in point.seen or point.is_blind:
             return
         received = self._received.get(sender)
         if received is not None and received[:2] != (passed.push, slot):
             received = None
+        hidden = self._hidden(passed, 0 if received is None else received.seen.number)
         now = SeenPoint(passed.number, point)
         step = WallStep(None, point, passed.hand, (), passed.number)
         if received is not None:
@@ -273,7 +276,7 @@ class WallProtocol(Component):
             if before is not None and witnesses is not None:
                 step = WallStep(before, point, passed.hand, witnesses, passed.number)
         self._received[sender] = _Received(passed.push, slot, now, step)
-        if local_map.proof.pass_step(passed.push, None if received is None else received.step, step, stretch):
+        if local_map.proof.pass_step(passed.push, None if received is None else received.step, step, stretch, hidden):
             self._replan_at = tick + PASSED_TICKS
             self._outbox.append(Outgoing(sender, ArcClosed(passed.push)))
         nodes = {each: node for node, each in slots.items()}
@@ -310,6 +313,19 @@ class WallProtocol(Component):
                 found[known[0]] = None
         return tuple(sorted(found))
 
+    def _hidden(self, passed: PassedPoint, last: int) -> list[tuple[int, ...]]:
+        """Return the slots that saw the points of a walk between the point `last` and this one, if this robot did not."""
+        hidden = next((each for each in passed.hidden if each[0] == self._situation.node), None)
+        if hidden is None or hidden[1] < last:
+            return []
+        return [self._occupied(nodes) for nodes in hidden[2]]
+
+    def _occupied(self, nodes: Iterable[int]) -> tuple[int, ...]:
+        """Return the slots of robots that stand, as far as this robot knows. A dead robot may be in sight that nobody knows."""
+        known = self._situation.local_map.states
+        states = [known[node] for node in nodes if node in known]
+        return tuple(each.slot for each in states if not (each.moving or each.redundant or each.slot == NOWHERE))
+
     def _end_walks(self, tick: int) -> None:
         """Take into the proof how far walls were followed by walks that have ended."""
         proof, slots = self._situation.local_map.proof, self._slots()
@@ -320,7 +336,7 @@ class WallProtocol(Component):
                     stretch = stretch.tied_at_end(over.end)
                 if proof.extend(over.push, stretch):
                     self._replan_at = tick + PASSED_TICKS
-            proof.end_walk(over.push)
+            proof.end_walk(over.push, max((each.last_number for each in over.stretches), default=0), over.end)
         self._ended.clear()
 
     def _spread(self, over: WalkOver) -> None:

@@ -5,7 +5,8 @@ import math
 import pytest
 
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
-from zwerm.agents.sensor_coverage.frontier.proofs.sight_ends import (
+from zwerm.agents.sensor_coverage.frontier.proofs.swarm_proof import SwarmProof
+from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import (
     SightEnd,
     shortened,
     sight_ends_at,
@@ -13,7 +14,6 @@ from zwerm.agents.sensor_coverage.frontier.proofs.sight_ends import (
     with_islands,
     without_edges,
 )
-from zwerm.agents.sensor_coverage.frontier.proofs.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, Walk, WalkPoint
 from zwerm.maths.simplicial import FlagComplex
 

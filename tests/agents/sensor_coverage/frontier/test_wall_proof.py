@@ -485,8 +485,8 @@ def test_a_walking_robot_tells_who_saw_the_way_that_a_robot_did_not_see() -> Non
     lines = Sightlines()
     assert lines.take(1, (7, 8)) == ()
     assert lines.take(2, (8,)) == ()
-    assert lines.take(3, (8, 9)) == ()
-    assert lines.take(4, (7, 9)) == ((7, 1, ((8,), (8, 9))),)
+    assert lines.take(3, (8, 9)) == ((9, 0, ((8,),)),), "it sees the walking robot for the first time"
+    assert lines.take(4, (7, 9)) == ((9, 0, ((8,),)), (7, 1, ((8,), (8, 9))))
     assert lines.take(5, (7,)) == ((7, 1, ((8,), (8, 9))),), "repeated, because the message may be lost"
     for number in range(6, 4 + RESENT_POINTS):
         assert lines.take(number, (7,))

@@ -26,10 +26,20 @@ BESIDE_EDGE_RAD: Final = math.radians(5.0)
 
 
 class SightEnd(NamedTuple):
-    """The direction [rad] in which a slot lost sight of a walk, or saw it first, and the slots that saw what is beyond."""
+    """The direction [rad] in which a slot lost sight of a walk, or saw it first, and the slots that saw what is beyond.
+
+    Where each slot keeps its own proof, the other slots `seen` saw the walk in this direction.
+    """
 
     direction_rad: float
     witnesses: tuple[int, ...]
+    seen: tuple[int, ...] = ()
+
+    def without(self, slots: Collection[int]) -> "SightEnd | None":
+        """Return the edge when these slots are lost: None if one of them saw the walk there."""
+        if any(each in slots for each in self.seen):
+            return None
+        return self._replace(witnesses=tuple(each for each in self.witnesses if each not in slots))
 
     def is_loose(self, standing: Collection[int]) -> bool:
         """Return whether no standing robot saw the walk beyond."""
@@ -55,9 +65,14 @@ def without_edges(arcs: Iterable[Arc], ends: Iterable[SightEnd]) -> list[Arc]:
     """Return the arcs of one stretch of wall without the directions beside loose edges of sight."""
     found = list(arcs)
     for end in ends:
-        edge = Arc(end.direction_rad - BESIDE_EDGE_RAD, 2.0 * BESIDE_EDGE_RAD)
+        edge = beside_edge(end)
         found = [part for each in found for part in _outside(each, edge)]
     return found
+
+
+def beside_edge(end: SightEnd) -> Arc:
+    """Return the arc of the directions beside an edge of sight."""
+    return Arc(end.direction_rad - BESIDE_EDGE_RAD, 2.0 * BESIDE_EDGE_RAD)
 
 
 def united_round(arcs: Iterable[Arc]) -> list[Arc]:
@@ -80,6 +95,13 @@ def shortened(near: Iterable[NearArc]) -> list[Arc]:
         for arc, hand in near
         if arc.width_rad > abs(hand) * BESIDE_EDGE_RAD
     ]
+
+
+def within_ends(arc: Arc) -> Arc:
+    """Return the directions of an arc that are not beside its ends."""
+    if arc.width_rad >= math.tau:
+        return arc
+    return Arc(arc.start_rad + BESIDE_EDGE_RAD, max(0.0, arc.width_rad - 2.0 * BESIDE_EDGE_RAD))
 
 
 def with_islands(opened: list[Arc], closed: Iterable[Arc]) -> list[Arc]:
