@@ -1,5 +1,6 @@
 """The closed arcs of one slot, as the robot at the slot keeps them without a coordinator."""
 
+import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import chain
 from typing import Final, NamedTuple
@@ -91,6 +92,7 @@ class SlotProof:
         self._stretch: list[Arc] = []
         self._stretch_end: WalkPoint | None = None
         self._open: list[Arc] | None = None  # until something changes
+        self._only_edges = False  # whether only edges of sight are open
 
     @property
     def ready(self) -> bool:
@@ -127,6 +129,7 @@ class SlotProof:
         followed = [arc for each in stretches for arc in each.arcs(standing, touched)]
         walks = self._by_walks.counting({*standing, NOWHERE})
         opened = complement([*self._by_view, *fans, *self._at_walls, *self._near, *walks, *followed])
+        self._only_edges = not opened
         if opened:  # edges of sight are left until all else is closed: many of them are seen from close by meanwhile
             return opened
         # A station cannot look behind what it touches. Nobody saw how a wall close to the slot goes on at the ends of its arc.
@@ -138,8 +141,9 @@ class SlotProof:
         return complement([*self._by_view, *fans, *self._by_walks.counting(standing), *edged])
 
     def _open_rad(self) -> float:
-        """Return the sum of all open arcs [rad]."""
-        return added(each.width_rad for each in self.open_arcs())
+        """Return the sum of all open arcs [rad], and a turn more unless only edges of sight are open."""
+        opened = added(each.width_rad for each in self.open_arcs())
+        return opened if self._only_edges else opened + math.tau
 
     def pass_step(
         self,

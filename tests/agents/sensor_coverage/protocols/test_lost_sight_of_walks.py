@@ -12,7 +12,7 @@ from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.maths.simplicial import FlagComplex
 
 WALK = 5
-BEFORE, BEYOND = (150, 200, 250), (250, 290, 330)
+BEFORE, BEYOND = (150, 200, 250), (250, 318, 330)
 # The robots at slots 1, 2 and 3 close the directions that the walks do not.
 ROBOTS = {1: 325, 2: 60, 3: 155}
 EDGE = 245, 255
@@ -36,16 +36,21 @@ def opened(proof: SlotProof) -> list[tuple[int, int]]:
 
 def follow(
     proof: SlotProof, walk: int, directions_deg: tuple[int, ...], hidden: tuple[tuple[int, ...], ...] = ()
-) -> None:
-    """Let a robot with the wall at its right hand pass slot 7 in these directions; it was hidden before."""
+) -> bool:
+    """Let a robot with the wall at its right hand pass slot 7 in these directions; it was hidden before.
+
+    Return whether less is open after the last point.
+    """
     last: WallStep | None = None
+    smaller = False
     tracker = StretchTracker(-1, 0.0)
     for number, each in enumerate(directions_deg, 1):
         point = WalkPoint({7: math.radians(each), SEER: 0.0}, (math.radians(each),), ())
         tracker.take(number, point.at, point.walls, (), (7, SEER))
         step = WallStep(None if last is None else last.point, point, -1, (), number)
-        proof.pass_step(walk, last, step, tracker.latest, hidden if last is None else ())
+        smaller = proof.pass_step(walk, last, step, tracker.latest, hidden if last is None else ())
         last = step
+    return smaller
 
 
 @pytest.mark.parametrize("witnesses", [(), (1,), (1, 2)])
@@ -56,7 +61,7 @@ def test_an_edge_of_sight_is_open_unless_a_robot_saw_what_is_behind_it(witnesses
     assert proof.lose_sight(WALK, 4, witnesses) is None
     proof.lose_sight(WALK, 5, ())  # nothing is new
     assert opened(proof) == [(250, 325)], "an edge is not asked for where an arc is open"
-    follow(proof, WALK + 1, BEYOND, (witnesses,))
+    assert follow(proof, WALK + 1, BEYOND, (witnesses,)), "the last arc is closed, and only the edge may be open"
     assert opened(proof) == ([] if witnesses else [EDGE])
     for walk in (WALK, WALK + 1):
         proof.end_walk(walk, 9, 2)
@@ -110,7 +115,7 @@ def test_another_walk_closes_an_edge() -> None:
     follow(proof, WALK, BEFORE)
     follow(proof, WALK + 1, BEYOND, ((),))
     assert opened(proof) == [(250, 255)]
-    follow(proof, WALK + 2, (230, 250, 270))
+    assert follow(proof, WALK + 2, (230, 250, 270))
     assert opened(proof) == []
 
 
