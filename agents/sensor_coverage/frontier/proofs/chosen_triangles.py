@@ -37,6 +37,8 @@ class ChosenTriangles:
         self._kept: dict[tuple[int, int], list[_KeptTriangle]] = {}  # by the slot beside and the side
         # The same of those that could count at the latest question, and the arcs that were chosen of them.
         self._chosen: dict[tuple[int, int], tuple[list[_KeptTriangle], list[ProvedArc]]] = {}
+        # The slots of the latest question, and the answer, until something changes.
+        self._latest: tuple[Collection[int], list[ProvedArc]] | None = None
 
     def add(self, arc: ProvedArc, triangle: WalkTriangle) -> None:
         """Take in the arc of a triangle, unless it is within another one that relies on less."""
@@ -46,19 +48,28 @@ class ChosenTriangles:
             found = [*(each for each in known if not _is_within(each, fresh)), fresh]
             found.sort(key=lambda each: each.rank)
             self._kept[key] = _without_inner(found)[:KEPT_MAX]
+            self._latest = None
 
     def lose(self, slots: Collection[int]) -> None:
         """Forget the triangles with points that one of these slots saw."""
+        self._latest = None
         for key, known in self._kept.items():
             self._kept[key] = [each for each in known if not any(slot in each.arc.seen for slot in slots)]
 
-    def counting(self, standing: Collection[int]) -> Iterator[ProvedArc]:
-        """Yield the arcs that count while these slots stand."""
+    def counting(self, standing: Collection[int]) -> list[ProvedArc]:
+        """Return the arcs that count while these slots stand. The same collection has the same slots later."""
+        if self._latest is None or self._latest[0] is not standing:
+            self._latest = standing, self._find_counting(standing)
+        return self._latest[1]
+
+    def _find_counting(self, standing: Collection[int]) -> list[ProvedArc]:
+        found, stand = list[ProvedArc](), frozenset(standing)
         for key, known in self._kept.items():
-            counts = [each for each in known if all(slot in standing for slot in each.arc.needed)]
+            counts = [each for each in known if stand.issuperset(each.arc.needed)]
             if key not in self._chosen or self._chosen[key][0] != counts:
                 self._chosen[key] = counts, _chosen_of(counts)
-            yield from self._chosen[key][1]
+            found += self._chosen[key][1]
+        return found
 
     def all(self) -> Iterator[ProvedArc]:
         """Yield all arcs, also those that do not count."""
@@ -110,4 +121,5 @@ def _without_inner(found: Iterable[_KeptTriangle]) -> list[_KeptTriangle]:
             max(group, key=lambda one: one.triangle.there_rad),
         )
     ]
-    return [each for each in found if any(each is one for one in outer)]
+    kept = {id(each) for each in outer}
+    return [each for each in found if id(each) in kept]

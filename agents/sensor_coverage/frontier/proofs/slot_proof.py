@@ -127,7 +127,7 @@ class SlotProof:
         standing, touched, stretches = self._scan.complex_.neighbours, self._touched, self._stretches.values()
         fans = [Arc(each.start_rad, each.width_rad) for each in self._triangles.counting(standing)]
         followed = [arc for each in stretches for arc in each.arcs(standing, touched)]
-        walks = self._by_walks.counting({*standing, NOWHERE})
+        walks = self._by_walks.counting((*standing, NOWHERE))
         opened = complement([*self._by_view, *fans, *self._at_walls, *self._near, *walks, *followed])
         self._only_edges = not opened
         if opened:  # edges of sight are left until all else is closed: many of them are seen from close by meanwhile

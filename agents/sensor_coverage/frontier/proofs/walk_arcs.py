@@ -33,8 +33,9 @@ class WalkArcs:
 
     def counting(self, standing: Collection[int]) -> Iterator[Arc]:
         """Yield the arcs that count while these slots stand."""
+        stand = frozenset(standing)
         for (needed, _), arcs in self._arcs.items():
-            if all(each in standing for each in needed):
+            if stand.issuperset(needed):
                 yield from arcs
 
     def unconditional(self) -> list[Arc]:
