@@ -14,7 +14,7 @@ from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStretch
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, Walk, WallStep
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
-from zwerm.agents.sensor_coverage.messages.pushes import ProvedArc
+from zwerm.agents.sensor_coverage.messages.pushes import LostSight, ProvedArc
 from zwerm.maths.simplicial import Edge, FlagComplex
 
 # Returns the cheapest routes from sources (slot: cost to start there) through a complex.
@@ -102,14 +102,10 @@ class SlotCoverageProof(Protocol):
     def memory(self) -> tuple[ProvedArc, ...]:
         """Return the arcs that walks closed, for the slot's next occupant."""
 
-    def edges(self) -> tuple[tuple[float, tuple[int, ...], tuple[int, ...]], ...]:
+    def edges(self) -> tuple[LostSight, ...]:
         """Return the edges of sight, for the slot's next occupant."""
 
-    def inherit(
-        self,
-        memory: Iterable[ProvedArc],
-        edges: Iterable[tuple[float, tuple[int, ...], tuple[int, ...]]] = (),
-    ) -> None:
+    def inherit(self, memory: Iterable[ProvedArc], edges: Iterable[LostSight] = ()) -> None:
         """Take over the arcs that walks closed, and the edges of sight, from the slot's former occupant."""
 
 

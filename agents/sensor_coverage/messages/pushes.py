@@ -39,6 +39,11 @@ class ProvedArc(NamedTuple):
     triangle: WalkTriangle | None = None
 
 
+# A direction [rad] in which a slot lost sight of a walk, or saw it first, the slots that saw it beyond, and those that saw it
+# there: an edge of sight.
+LostSight = tuple[float, tuple[int, ...], tuple[int, ...]]
+
+
 class _PushMessagePart(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """A part of a message."""
 
@@ -72,8 +77,7 @@ class SlotMemory(_PushMessagePart, frozen=True):
     `claims` is the number of its newest claim. `obstructed` has (key of an attempt, dead robot whose body stopped it).
     `explored` are directions [rad] of attempts to follow a wall, and `probed` those of probes of walls close by.
     `proved` has the arcs that walks closed. `distances_m` has (neighbouring slot, distance [m]) where a walk measured it.
-    `edges` has directions [rad] in which the slot lost sight of a walk, or saw it first, with the slots that saw it beyond, and
-    the slots that saw it there.
+    `edges` has the edges of sight.
     """
 
     slot: int
@@ -89,7 +93,7 @@ class SlotMemory(_PushMessagePart, frozen=True):
     proved: tuple[ProvedArc, ...] = ()
     distances_m: tuple[tuple[int, float], ...] = ()
     probed: tuple[float, ...] = ()
-    edges: tuple[tuple[float, tuple[int, ...], tuple[int, ...]], ...] = ()
+    edges: tuple[LostSight, ...] = ()
 
 
 # The robots of a push, rear to front, each as (slot before the push, robot).

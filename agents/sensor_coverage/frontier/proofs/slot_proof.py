@@ -33,7 +33,7 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     united,
 )
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
-from zwerm.agents.sensor_coverage.messages.pushes import ProvedArc, WalkTriangle
+from zwerm.agents.sensor_coverage.messages.pushes import LostSight, ProvedArc, WalkTriangle
 from zwerm.maths.simplicial import FlagComplex
 from zwerm.maths.sums import added
 
@@ -49,9 +49,6 @@ EDGE_SLOTS_MAX: Final = 8
 # What an arc that the slot's own robot followed close to it depends on: no other slot. It is not the same as a walk that no
 # other slot saw.
 NEAR: Final[tuple[tuple[int, ...], tuple[int, ...]]] = ((), (NOWHERE,))
-
-# A direction in which a slot lost sight of a walk, or saw it first, in messages; see `SightEnd`.
-Edge = tuple[float, tuple[int, ...], tuple[int, ...]]
 
 
 class _Sight(NamedTuple):
@@ -233,10 +230,9 @@ class SlotProof:
         The point with the number `last_number` was its last one at a wall. The walking robot stands at the slot `end`.
         """
         self._open = None
-        sight = self._sights.get(walk)
+        sight = self._sights.pop(walk, None)
         if sight is not None and (end != NOWHERE or sight.number + BLIND_MAX < last_number):
-            self._lose_sight(walk, () if end == NOWHERE else (end,))
-        self._sights.pop(walk, None)
+            self._add_edge(sight, () if end == NOWHERE else (end,))
         self._touches.pop(walk, None)
         for key in [each for each in self._stretches if each[0] == walk]:
             for needed, seen, arc in self._stretches.pop(key).keyed_arcs(self._touched):
@@ -331,7 +327,7 @@ class SlotProof:
         self._open = None
         self._near = united([*self._near, *(Arc(*each) for each in arcs)])
 
-    def edges(self) -> tuple[Edge, ...]:
+    def edges(self) -> tuple[LostSight, ...]:
         """Return the edges of sight, for the slot's next occupant: the latest ones, as far as they name few slots."""
         latest = list(self._edges)[-EDGES_MAX:]
         return tuple((there, saw[:EDGE_SLOTS_MAX], seen[:EDGE_SLOTS_MAX]) for there, saw, seen in latest)
@@ -350,7 +346,7 @@ class SlotProof:
             found = found[:-1]
         return found
 
-    def inherit(self, memory: Iterable[ProvedArc], edges: Iterable[Edge] = ()) -> None:
+    def inherit(self, memory: Iterable[ProvedArc], edges: Iterable[LostSight] = ()) -> None:
         """Take over the arcs that walks closed, and the edges of sight, from the slot's former occupant."""
         self._open = None
         self._near, self._by_walks, self._triangles = [], WalkArcs(), ChosenTriangles()

@@ -271,12 +271,13 @@ class WallProtocol(Component):
         now = SeenPoint(passed.number, point)
         step = WallStep(None, point, passed.hand, (), passed.number)
         if received is not None:
-            witnesses = self._witnesses(passed, received.seen.number, slots)
+            witnesses = _witnesses(passed, received.seen.number, hidden, slots)
             before = point_before(slot, received.seen, now, passed.touch_since, bool(witnesses))
             if before is not None and witnesses is not None:
                 step = WallStep(before, point, passed.hand, witnesses, passed.number)
         self._received[sender] = _Received(passed.push, slot, now, step)
-        if local_map.proof.pass_step(passed.push, None if received is None else received.step, step, stretch, hidden):
+        occupied = [self._occupied(nodes) for nodes in hidden]
+        if local_map.proof.pass_step(passed.push, None if received is None else received.step, step, stretch, occupied):
             self._replan_at = tick + PASSED_TICKS
             self._outbox.append(Outgoing(sender, ArcClosed(passed.push)))
         nodes = {each: node for node, each in slots.items()}
@@ -296,29 +297,10 @@ class WallProtocol(Component):
         ):
             self._replan_at = tick + PASSED_TICKS
 
-    def _witnesses(self, passed: PassedPoint, last: int, slots: Mapping[int, int]) -> tuple[int, ...] | None:
-        """Return slots that saw all points since the one with the number `last`, as far as this robot did not; or None.
-
-        Points whose messages were lost were seen, unless the walking robot says otherwise.
-        """
+    def _hidden(self, passed: PassedPoint, last: int) -> tuple[tuple[int, ...], ...]:
+        """Return the robots that saw the points of a walk between the point `last` and this one, if this robot did not."""
         hidden = next((each for each in passed.hidden if each[0] == self._situation.node), None)
-        if hidden is None or hidden[1] < last:
-            return () if passed.number - last <= RESENT_POINTS else None
-        found: dict[int, None] = {}
-        for witnesses in hidden[2]:
-            known = [slots[node] for node in witnesses if node in slots]
-            if not known:
-                return None
-            if not any(each in found for each in known):
-                found[known[0]] = None
-        return tuple(sorted(found))
-
-    def _hidden(self, passed: PassedPoint, last: int) -> list[tuple[int, ...]]:
-        """Return the slots that saw the points of a walk between the point `last` and this one, if this robot did not."""
-        hidden = next((each for each in passed.hidden if each[0] == self._situation.node), None)
-        if hidden is None or hidden[1] < last:
-            return []
-        return [self._occupied(nodes) for nodes in hidden[2]]
+        return () if hidden is None or hidden[1] < last else hidden[2]
 
     def _occupied(self, nodes: Iterable[int]) -> tuple[int, ...]:
         """Return the slots of robots that stand, as far as this robot knows. A dead robot may be in sight that nobody knows."""
@@ -371,6 +353,25 @@ class WallProtocol(Component):
     def next_wake(self) -> int | None:
         """Return the tick at which plans are made again."""
         return self._replan_at
+
+
+def _witnesses(
+    passed: PassedPoint, last: int, hidden: Collection[Iterable[int]], slots: Mapping[int, int]
+) -> tuple[int, ...] | None:
+    """Return slots that saw all points since the one with the number `last`, where the walk was `hidden`; or None.
+
+    Points whose messages were lost were seen, unless the walking robot says otherwise.
+    """
+    if not hidden:
+        return () if passed.number - last <= RESENT_POINTS else None
+    found: dict[int, None] = {}
+    for nodes in hidden:
+        known = [slots[node] for node in nodes if node in slots]
+        if not known:
+            return None
+        if not any(each in found for each in known):
+            found[known[0]] = None
+    return tuple(sorted(found))
 
 
 def message_of(stretch: FollowedStretch) -> WallStretch:
