@@ -18,10 +18,14 @@ SPREAD_READINGS_MIN = 4
 
 
 class Touched(NamedTuple):
-    """A closed touch switch: the bearing [rad] of a wall; or of the robot `node`, which is visible in its sector."""
+    """A closed touch switch: the bearing [rad] of a wall; or of the robot `node`, which is visible in its sector.
+
+    `switch_rad` is the direction [rad] of the switch.
+    """
 
     bearing_rad: float
     node: int | None
+    switch_rad: float = 0.0
 
 
 class OdometryFrame:
@@ -66,8 +70,8 @@ class OdometryFrame:
 
     def _contact(self, contact: Contact, turned: float) -> Touched:
         """Return what a closed switch faces: the visible robot nearest to its direction, or a wall."""
-        nearest = next(iter(self._faced(contact, turned)), None)
-        return Touched(contact.bearing_rad + turned, None) if nearest is None else Touched(self.seen[nearest], nearest)
+        nearest, switch_rad = next(iter(self._faced(contact, turned)), None), contact.bearing_rad + turned
+        return Touched(switch_rad if nearest is None else self.seen[nearest], nearest, switch_rad)
 
     def _faced(self, contact: Contact, turned: float) -> tuple[int, ...]:
         """Return the visible robots that a closed switch may face, the nearest to its direction first."""

@@ -8,14 +8,15 @@ change much less, the contact is with a wall: beside a corner a robot may stand 
 
 import math
 from collections import deque
-from collections.abc import Callable, Sequence
-from typing import Final
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Final, NamedTuple
 
 import msgspec
 
 from zwerm.agents.sensor_coverage.frontier.directions import angle_between
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
 from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
+from zwerm.agents.sensor_coverage.motion.odometry_frame import Touched
 
 # Points after which a contact that is still uncertain counts as none.
 POINTS_MAX: Final = 5
@@ -28,6 +29,11 @@ WALL_POINTS: Final = 3
 # A bearing shows a distance only if the walking robot moved by this distance [m] across its line of sight: its noise would
 # decide.
 ACROSS_M_MIN: Final = 0.03
+# A robot in sight is not in touch if its bearing shows a distance of more than this many radii of a body.
+TOUCHING_RADII_MAX: Final = 4.0
+# Latest steps with whose bearings those of robots in the direction of a contact are compared, and steps for which such a robot
+# counts as beyond a wall.
+STEPS_MAX: Final = 3
 
 
 class _Contact(msgspec.Struct):
@@ -116,6 +122,75 @@ class TouchedRobots:
             if contact.is_wall():
                 point = msgspec.structs.replace(point, touched=(*point.touched, contact.bearing_rad))
         self._report(point)
+
+
+class _Touch(NamedTuple):
+    """A contact in the direction of a robot: its steps, whether the robot came into sight with it, or is beyond a wall."""
+
+    steps: int
+    is_new: bool
+    is_beyond: bool
+
+
+class RobotsInReach:
+    """Tells robots in touch from those that only stand in the direction of a contact, by their bearings on the latest steps.
+
+    `out_of_reach` are the robots in the direction of a contact that the latest step showed to be too far away. The point there
+    has no contact with them.
+    """
+
+    def __init__(self, radius_m: float) -> None:
+        self.out_of_reach: frozenset[int] = frozenset()
+        self._distance_m = TOUCHING_RADII_MAX * radius_m
+        self._before: deque[tuple[Vector, Mapping[int, float]]] = deque(maxlen=STEPS_MAX)
+        self._touches: dict[int, _Touch] = {}
+
+    def begin(self) -> None:
+        """Begin another drive: robots have moved meanwhile."""
+        self.out_of_reach = frozenset()
+        self._before.clear()
+        self._touches.clear()
+
+    def take(
+        self,
+        before: Vector,
+        seen_before: Mapping[int, float],
+        at: Vector,
+        seen: Mapping[int, float],
+        nodes: Iterable[int],
+    ) -> None:
+        """Take in a step: the places [m] before and after it, the bearings [rad] of robots, and those in touch after it.
+
+        A robot counts as beyond a wall if one of the steps before the contact shows that it is too far away. So it does if it
+        has just come into sight: a robot behind the end of a wall does when the walking robot touches that end. A body that is
+        pushed moves as the robot does, and would look far away. So the steps during a contact do not count, but for one after
+        a robot has come into sight, and no robot counts as beyond a wall for long.
+        """
+        self._before.append((before, seen_before))
+        out_of_reach, touches = dict[int, None](), dict[int, _Touch]()
+        for node in nodes:
+            far = [
+                is_farther(self._distance_m, (at[0] - place[0], at[1] - place[1]), bearings[node], seen[node])
+                for place, bearings in self._before
+                if node in bearings and node in seen
+            ]
+            if node in seen_before and far[-1]:
+                out_of_reach[node] = None
+            last = self._touches.get(node)
+            if last is None:
+                touches[node] = _Touch(1, node not in seen_before, node not in seen_before or any(far))
+            else:
+                is_beyond = any(far) if last.steps == 1 and last.is_new else last.is_beyond
+                touches[node] = _Touch(last.steps + 1, last.is_new, is_beyond and last.steps < STEPS_MAX)
+        self.out_of_reach, self._touches = frozenset(out_of_reach), touches
+
+    def steered_by(self, contacts: Iterable[Touched]) -> list[Touched]:
+        """Return the contacts by which the walking robot steers: those in the direction of a robot beyond are with a wall.
+
+        Else it would drive away from the corner that it touches, in a wide curve without a contact.
+        """
+        beyond = {node for node, each in self._touches.items() if each.is_beyond}
+        return [Touched(each.switch_rad, None, each.switch_rad) if each.node in beyond else each for each in contacts]
 
 
 def is_farther(distance_m: float, moved_m: Vector, before_rad: float, now_rad: float) -> bool:

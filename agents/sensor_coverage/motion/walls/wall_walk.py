@@ -7,7 +7,7 @@ passes those as walls that do not yield (`dead_bodies`).
 """
 
 import math
-from collections.abc import Callable, Collection, Generator, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Generator, Iterable, Sequence
 from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.directions import angle_between
@@ -17,7 +17,7 @@ from zwerm.agents.sensor_coverage.motion.locomotion import Locomotion
 from zwerm.agents.sensor_coverage.motion.walls.dead_bodies import DeadBodies, HeldPoints
 from zwerm.agents.sensor_coverage.motion.walls.near_arcs import NearPoint, NearWay, start_in_sight
 from zwerm.agents.sensor_coverage.motion.walls.past_edge import EDGE_M_MAX, past_edge
-from zwerm.agents.sensor_coverage.motion.walls.touched_robots import TouchedRobots, is_farther
+from zwerm.agents.sensor_coverage.motion.walls.touched_robots import RobotsInReach, TouchedRobots
 from zwerm.agents.sensor_coverage.motion.walls.wall_heading import hand_on_wall
 from zwerm.agents.sensor_coverage.motion.walls.waypoint_choice import WaypointChoice, first_of_message
 from zwerm.wire.messages import BodyVelocity
@@ -36,8 +36,6 @@ WEDGED_TICKS: Final = 30
 CLEARING_M_MAX: Final = 3.0
 # The walking robot leaves its slot by this distance [m] before the next robot takes it: two bodies and some space.
 CLEAR_M: Final = 0.3
-# A robot in sight is not in touch if its bearing shows a distance of more than this many radii of a body.
-TOUCHING_RADII_MAX: Final = 4.0
 # A robot in touch within this angle of the direction back to the start stands there.
 ROBOT_BEHIND_RAD: Final = math.radians(60.0)
 # Length [m] of one leg of a walk: after each leg it is decided whether the walk goes on.
@@ -79,7 +77,7 @@ class WallWalk:
         self._start = motion.position
         self._way_near: NearWay | None = None  # while the robot follows a wall close to the start
         self._near_points = self._held_points(self.on_step)
-        self._out_of_reach: frozenset[int] = frozenset()  # robots in the direction of a contact that are not in touch
+        self._in_reach = RobotsInReach(motion.radius_m)
 
     @property
     def radius_m(self) -> float:
@@ -138,7 +136,7 @@ class WallWalk:
         """Begin to record the way along a wall from here, close to the start, with the wall at the hand."""
         way = self._way_near = NearWay(self._start, hand, self.radius_m)
         self._near_points = self._held_points(way.waypoints.append)
-        self._out_of_reach = frozenset()
+        self._in_reach.begin()
         self._report(self._near_points)
         way.take(self._near_point())
         return way
@@ -264,7 +262,8 @@ class WallWalk:
         if not self._sees(keep):
             return LOST, 0.0, ()
         self._trail = [motion.position]
-        self._turned_rad, self._out_of_reach = 0.0, frozenset()
+        self._turned_rad = 0.0
+        self._in_reach.begin()
         self._report(held)
         choice = WaypointChoice(motion.position, frame.seen, frame.contacts)
         kept, way, stuck = choice.chosen, 0.0, 0
@@ -288,10 +287,12 @@ class WallWalk:
 
     def _advance(self, hand: int) -> Generator[BodyVelocity, None, float]:
         """Make one step along the wall, and return its length [m]."""
-        before, seen_before = self._motion.position, self._motion.frame.seen
+        motion, frame = self._motion, self._motion.frame
+        before, seen_before = motion.position, frame.seen
         yield self._step(hand)
-        self._check_contacts(before, seen_before)
-        return math.dist(before, self._motion.position)
+        touched = [each.node for each in frame.contacts if each.node is not None]
+        self._in_reach.take(before, seen_before, motion.position, frame.seen, touched)
+        return math.dist(before, motion.position)
 
     def _step(self, hand: int) -> BodyVelocity:
         """Return the velocity of the next step, and keep the direction of the wall."""
@@ -300,7 +301,7 @@ class WallWalk:
         if push is not None:
             self._latest = motion.position, self._latest[1]
             return push
-        contacts = self._bodies.contacts()
+        contacts = self._in_reach.steered_by(self._bodies.contacts())
         heading, wall_rad = hand_on_wall(self._wall_rad, contacts, hand)
         walls = [each.bearing_rad for each in contacts if each.node is None]
         if any(angle_between(each, wall_rad) < 1e-6 for each in walls):
@@ -317,18 +318,6 @@ class WallWalk:
         ux, uy = unit(heading)
         self._latest = motion.position, heading
         return motion.velocity(ux * motion.step_m, uy * motion.step_m)
-
-    def _check_contacts(self, before: Vector, seen_before: Mapping[int, float]) -> None:
-        """Find the robots that are in the direction of a contact, but too far away: the robot touches something else."""
-        motion, seen = self._motion, self._motion.frame.seen
-        moved = motion.position[0] - before[0], motion.position[1] - before[1]
-        self._out_of_reach = frozenset(
-            node
-            for node in (each.node for each in motion.frame.contacts)
-            if node in seen
-            and node in seen_before
-            and is_farther(TOUCHING_RADII_MAX * motion.radius_m, moved, seen_before[node], seen[node])
-        )
 
     def _report(self, held: HeldPoints) -> None:
         """Report the point at which the robot is now."""
@@ -353,7 +342,9 @@ class WallWalk:
             tuple(Sighting(node, bearing) for node, bearing in sorted(frame.seen.items())),
             tuple(each.bearing_rad for each in frame.contacts if each.node is None),
             tuple(
-                each.node for each in frame.contacts if each.node is not None and each.node not in self._out_of_reach
+                each.node
+                for each in frame.contacts
+                if each.node is not None and each.node not in self._in_reach.out_of_reach
             ),
             None if near is None else start_in_sight(self._start, self._trail, near.hand, self.radius_m),
         )
