@@ -127,7 +127,7 @@ class WallWalks:
             return (*followers, leader)
         keep = (slots.occupant[plan.mover],) if plan.beside and plan.mover in slots.occupant else ()
         meet = tuple(slots.occupant[each] for each in plan.meet if each in slots.occupant)
-        yield from self._legs(leader, plan.mover, FollowWall(pushing.cycle, LEG_M, plan.hand, keep, meet), scan)
+        yield from self._legs(leader, plan.mover, walked, FollowWall(pushing.cycle, LEG_M, plan.hand, keep, meet), scan)
         return (*followers, leader)
 
     def probe(self, plans: Sequence[Plan]) -> Routine[Moved]:
@@ -210,29 +210,29 @@ class WallWalks:
                 return (robot,)
         return ()
 
-    def _legs(self, leader: int, origin: int, leg: FollowWall, scan: ScanResult) -> Routine[None]:
-        """Follow the wall, leg by leg, from the slot `origin`.
+    def _legs(self, leader: int, origin: int, there: Walked, leg: FollowWall, scan: ScanResult) -> Routine[None]:
+        """Follow the wall, leg by leg, from the slot `origin`; `there` is the way to the wall.
 
         The robot got clear with the wall at its other hand: so it passes its first slot.
         """
         slots, idle_legs = self._slots, 0
         number: int | None = None
+        way: list[Waypoint] = []
         left = self._open(scan)
         while (left > 0.0 or leg.meet) and idle_legs < IDLE_LEGS_MAX:
             walked = yield from self._order(leader, leg)
             if walked is None:
                 return
-            stays = walked.end in (LOST, MET)
+            there, stays = walked, walked.end in (LOST, MET)
+            way += walked.waypoints
             number = slots.take_walk(leader, leg.hand, walked.waypoints, walked.radius_m, number, stays)
             if stays:
-                self._measure(leader, walked.waypoints)
-                here = slots.slot_of()[leader]
-                if origin in slots.occupant:
-                    slots.length_m[here, origin] = slots.length_m[origin, here] = math.hypot(walked.x_m, walked.y_m)
+                self._measure(leader, origin, there, way)
                 return
             self.idle = without_witnesses(self.idle, slots.walks[number].points)
             before, left = left, self._open(scan)
             idle_legs = idle_legs + 1 if left > before - PROGRESS_RAD or walked.end == SHUT else 0
+        self._measure(leader, origin, there, way)
         self.idle[slots.slot_of()[leader]] = None
 
     def wake(self, scan: ScanResult) -> bool:
@@ -253,13 +253,18 @@ class WallWalks:
         """Return the sum of all open arcs [rad]."""
         return added(arc.width_rad for arcs in self._walls.open_arcs(scan).values() for arc in arcs)
 
-    def _measure(self, leader: int, waypoints: Sequence[Waypoint]) -> None:
-        """Find the distances of the leader's new slot to the robots in view, by their bearings along the walk and odometry."""
-        slot_of = self._slots.slot_of()
+    def _measure(self, leader: int, origin: int, walked: Walked, way: Sequence[Waypoint]) -> None:
+        """Find the distances of the leader's new slot to the robots in view, by their bearings along its way and odometry.
+
+        Its distance to the slot `origin` is that of the end of the way, where it walked last.
+        """
+        slot_of, length_m = self._slots.slot_of(), self._slots.length_m
         here = slot_of[leader]
-        for node, length in distances_m(waypoints).items():
+        for node, length in distances_m(way).items():
             if node in slot_of:
-                self._slots.length_m[here, slot_of[node]] = self._slots.length_m[slot_of[node], here] = length
+                length_m[here, slot_of[node]] = length_m[slot_of[node], here] = length
+        if origin in self._slots.occupant:
+            length_m[here, origin] = length_m[origin, here] = math.hypot(walked.x_m, walked.y_m)
 
     def _order(self, robot: int, command: ToWall | FollowWall | Probe) -> Routine[Walked | None]:
         """Return how a walk ended, or None if the robot does not answer. The command names the dead robots."""

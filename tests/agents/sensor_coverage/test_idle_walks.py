@@ -8,7 +8,7 @@ from zwerm.agents.runtime.node import Node
 from zwerm.agents.sensor_coverage.frontier.plan import WALLS, Plan
 from zwerm.agents.sensor_coverage.local_robot import LocalRobot
 from zwerm.agents.sensor_coverage.messages.beacons import NO_PATH_VECTOR, PathVector, Route, SeenRobot, StateBeacon
-from zwerm.agents.sensor_coverage.messages.commands import LOST, STRETCH
+from zwerm.agents.sensor_coverage.messages.commands import LOST, STRETCH, Sighting, Waypoint
 from zwerm.agents.sensor_coverage.messages.pushes import ReferenceBearing, SlotMemory, TakeSlot
 from zwerm.agents.sensor_coverage.motion.walls.wall_walk import IDLE_LEGS_MAX, WalkResult
 from zwerm.agents.sensor_coverage.protocols.token_push import TokenPush
@@ -54,6 +54,22 @@ def test_a_robot_leaves_after_a_walk_that_closed_nothing(
     push._walked(WalkResult(end, 0.4))
     push._leave_if_spare()
     assert robot.local_map.redundant is leaves
+
+
+def test_a_walk_measures_the_distances_to_its_slot_and_to_robots_in_sight_by_all_of_its_legs() -> None:
+    """The second leg leads towards robot 6, and does not show its distance."""
+    robot, push = walking(beside=False)
+    robot.local_map.receive(6, StateBeacon(1, 10, 0, False, False, 1, (), (), (), NO_PATH_VECTOR), 1)
+    at_m = 1.2, 0.8
+    legs = [[(0.0, 0.1 * step) for step in range(9)], [(0.1 * step, 0.8) for step in range(4)]]
+    for idle_legs, leg in enumerate(legs):
+        way = tuple(
+            Waypoint(x, y, (Sighting(6, math.atan2(at_m[1] - y, at_m[0] - x)),), (-math.pi / 2.0,), ()) for x, y in leg
+        )
+        robot.situation.motion.frame.x_m, robot.situation.motion.frame.y_m = leg[-1]
+        push._idle_legs = idle_legs
+        push._walked(WalkResult(STRETCH, 0.4, way))
+    assert robot.local_map.distances_m == pytest.approx({9: math.hypot(0.3, 0.8), 10: 0.9})
 
 
 @pytest.mark.parametrize(

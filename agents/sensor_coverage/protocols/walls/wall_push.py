@@ -5,6 +5,7 @@ leader leaves the complex, and the next push may begin with it. Where no standin
 new slot, and the deployment goes on from there.
 """
 
+import math
 from abc import abstractmethod
 from collections.abc import Collection, Iterable, Sequence
 from typing import Final, Protocol
@@ -12,11 +13,11 @@ from typing import Final, Protocol
 from zwerm.agents.sensor_coverage.frontier.directions import wrapped
 from zwerm.agents.sensor_coverage.frontier.plan import WALLS, Plan
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
-from zwerm.agents.sensor_coverage.messages.commands import LOST, OPEN, SHUT, STRETCH, Sighting
+from zwerm.agents.sensor_coverage.messages.commands import LOST, OPEN, SHUT, STRETCH, Sighting, Waypoint
 from zwerm.agents.sensor_coverage.messages.pushes import AllStanding, Body, PushAborted
 from zwerm.agents.sensor_coverage.motion.push_drives import DriveResult
 from zwerm.agents.sensor_coverage.motion.triangulation import distances_m
-from zwerm.agents.sensor_coverage.motion.walls.wall_walk import IDLE_LEGS_MAX, WalkResult
+from zwerm.agents.sensor_coverage.motion.walls.wall_walk import IDLE_LEGS_MAX, WalkResult, WallWalk
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
 from zwerm.agents.sensor_coverage.protocols.push_chain import PushChain
 from zwerm.agents.sensor_coverage.protocols.walls.wall_protocol import WallProtocol
@@ -32,6 +33,10 @@ class WallSituation(Protocol):
     @property
     def tick(self) -> int:
         """The number of the current tick."""
+
+    @property
+    def wall_walk(self) -> WallWalk:
+        """This robot's walk along walls."""
 
     def stand(self) -> None:
         """End a drive."""
@@ -64,6 +69,7 @@ class WallPush:
     _situation: WallSituation
     _map: LocalMap
     _legs = _idle_legs = 0
+    _way: tuple[Waypoint, ...] = ()  # points of the walk
     _has_helped = False  # the walk has closed a part of an arc
     _is_idle = False  # the walk has closed nothing, and ended where the robot behind is out of sight
     _near: tuple[tuple[float, float], ...] = ()  # arcs around this robot's slot that the leader has closed
@@ -196,6 +202,8 @@ class WallPush:
     def _walked(self, result: DriveResult | WalkResult) -> None:
         """Follow the wall further while that closes something; else stand at the new slot where the walk has ended."""
         plan, protocol = self._plan, self.walls
+        if isinstance(result, WalkResult):
+            self._way += result.waypoints
         closed = protocol is not None and protocol.has_closed()
         self._idle_legs = 0 if closed else self._idle_legs + 1
         self._has_helped = self._has_helped or closed
@@ -207,8 +215,9 @@ class WallPush:
             protocol.end(self.id)
         self._is_spare = isinstance(result, WalkResult) and result.end != LOST
         self._is_idle = plan is not None and plan.beside and not self._is_spare and not self._has_helped
-        if isinstance(result, WalkResult):
-            self._map.note_distances(distances_m(result.waypoints))
+        self._map.note_distances(distances_m(self._way))
+        if plan is not None:
+            self._map.distances_m[plan.mover] = math.hypot(*self._situation.wall_walk.way)
         self._settled()
 
     def _leave_if_spare(self) -> None:
