@@ -10,13 +10,15 @@ from zwerm.agents.sensor_coverage.frontier.strips.crossings import (
     crossings_of_step,
 )
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStretch, Pocket, StretchEnd
-from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import SightEnd, beside_edge, without_edges
+from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import SightEnd, beside_edge, united_round, without_edges
 from zwerm.agents.sensor_coverage.frontier.strips.stretches import pocket_of
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     Arc,
     Crossing,
     WalkPoint,
+    arc_between,
     arcs_into,
+    contains,
     overlap,
     shared_arcs,
 )
@@ -120,15 +122,40 @@ class SeenStretch:
 
     def edged_arcs(self, standing: Collection[int], contacts: tuple[float, ...] = ()) -> list[Arc]:
         """Return the arcs that are closed while these slots stand, without the directions beside loose edges of sight."""
-        return without_edges(self.arcs(standing, contacts), (each for each in self._edges if not each.witnesses))
+        return without_edges(
+            self.arcs(standing, contacts), (each for each in self._hiding_edges() if not each.witnesses)
+        )
 
     def keyed_arcs(self, contacts: Collection[float] = ()) -> Iterator[KeyedArc]:
         """Yield the arcs that are closed, with what they depend on: also on the slots that tie the ends.
 
         `contacts` are directions [rad] of walls in touch.
         """
+        edges = self._hiding_edges()
         for each in self._keyed_arcs(contacts):
-            yield from _divided(each, self._edges)
+            yield from _divided(each, edges)
+
+    def _hiding_edges(self) -> list[SightEnd]:
+        """Return the edges of sight behind which a wall may be hidden: without those that a walk passed in sight.
+
+        A slot that saw the walking robot all along, from one side of the direction to the other, sees the wall there: a corner
+        in front of the wall would have hidden the robot, and the wall itself hides what is behind it. So it is where a robot
+        goes round an obstacle several times, and its walk ends somewhere beside it.
+        """
+        passed = self._passed() if self._edges else []
+        return [each for each in self._edges if not contains(passed, beside_edge(each))]
+
+    def _passed(self) -> list[Arc]:
+        """Return the directions that the walking robot passed in sight, an arc for each part of the way without a break."""
+        found, part, last = list[Arc](), list[Arc](), None
+        for step in self._steps:
+            if step.needed or step.before is not last:
+                found += united_round(part)
+                part = []
+            if not step.needed:
+                part.append(arc_between(step.before.seen[self._slot], step.point.seen[self._slot]))
+            last = step.point
+        return [*found, *united_round(part)]
 
     def _keyed_arcs(self, contacts: Collection[float]) -> Iterator[KeyedArc]:
         """Yield the arcs that are closed, as if no edge of sight was loose."""

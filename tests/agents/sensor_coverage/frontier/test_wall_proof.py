@@ -491,3 +491,20 @@ def test_a_walking_robot_tells_who_saw_the_way_that_a_robot_did_not_see() -> Non
     for number in range(6, 4 + RESENT_POINTS):
         assert lines.take(number, (7,))
     assert lines.take(4 + RESENT_POINTS, (7,)) == ()
+
+
+def test_a_walking_robot_remembers_who_saw_the_first_and_the_last_point_that_a_robot_did_not_see() -> None:
+    """They are responsible for what is behind the corner at which that robot lost it, and for where it sees it again."""
+    lines = Sightlines()
+    lines.take(1, (7, 8))
+    lines.take(2, (8,))
+    for number in range(3, 200):
+        lines.take(number, (9,))
+    ((node, last, between),) = lines.take(200, (7,))
+    assert (node, last) == (7, 1)
+    assert (between[0], between[-1]) == ((8,), (9,))
+    assert () in between, "nobody is known to have seen the points that are forgotten"
+    for number, seen in ((201, (8,)), (202, (9,)), (203, (8,))):
+        lines.take(number, seen)
+    between = next(each for each in lines.take(204, (7,)) if each[0] == 7)[2]
+    assert between == ((8,), (9,), (8,))

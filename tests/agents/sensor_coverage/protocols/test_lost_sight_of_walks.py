@@ -143,3 +143,29 @@ def test_the_next_occupant_learns_the_latest_edges() -> None:
     edges = proof.edges()
     assert len(edges) == EDGES_MAX
     assert edges[-1][0] == math.radians(100 + EDGES_MAX + 4)
+
+
+@pytest.mark.parametrize("over", [False, True])
+@pytest.mark.parametrize("passes_in_sight", [True, False])
+def test_an_edge_is_open_only_where_the_walk_did_not_pass_in_sight(over: bool, passes_in_sight: bool) -> None:
+    """The robot goes round an obstacle twice, and stops in front of slot 7. Then it leaves."""
+    proof = SlotProof()
+    look(proof)
+    tracker, last = StretchTracker(-1, 0.0), None
+    rounds = [(150, 200, 250, 318, 330), (150, 200, 250)] if passes_in_sight else [(250, 318, 330), (150, 200, 250)]
+    number = 0
+    for each_round in rounds:
+        for each in each_round:
+            number += 1
+            point = WalkPoint({7: math.radians(each), SEER: 0.0}, (math.radians(each),), ())
+            tracker.take(number, point.at, point.walls, (), (7, SEER))
+            step = WallStep(None if last is None else last.point, point, -1, (), number)
+            proof.pass_step(WALK, last, step, tracker.latest)
+            last = step
+        last = None
+        proof.lose_sight(WALK, number + 1, (2,))
+    if over:
+        proof.end_walk(WALK, number, 2)
+    assert opened(proof) == []
+    proof.lose(2)
+    assert opened(proof) == ([] if passes_in_sight else [EDGE])
