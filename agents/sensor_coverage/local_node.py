@@ -5,6 +5,7 @@ from typing import Final
 from zwerm.agents.runtime.contract import Controller, Setup
 from zwerm.agents.sensor_coverage.frontier.planner import Planner
 from zwerm.agents.sensor_coverage.frontier.proofs.slot_proof import SlotProof
+from zwerm.agents.sensor_coverage.frontier.wall_proof import mark_of
 from zwerm.agents.sensor_coverage.messages import advice, peers
 from zwerm.agents.sensor_coverage.messages.commands import INCARNATIONS
 from zwerm.agents.sensor_coverage.motion.locomotion import STOP
@@ -43,6 +44,7 @@ class LocalNode(Controller):
             self.advice_client = AdviceClient(setup.dt_s)
         self._claimed: bool | None = False if setup.incarnation == 1 else None  # a former one may have claimed
         self._search = 0
+        self._wave = 0
         # The tick of the wake-up with which the robot fell asleep; None during an activity.
         self._due: int | None = None
 
@@ -80,6 +82,7 @@ class LocalNode(Controller):
         if self.completion.search != self._search:
             self._search = self.completion.search
             situation.local_map.reopen()
+        self._lose_dead()
         self.components.poll(situation.tick)
         if bool(situation.claims) is not self._claimed:
             self._claimed = bool(situation.claims)
@@ -88,6 +91,18 @@ class LocalNode(Controller):
         snapshot, situation.snapshot = situation.snapshot, b""
         outbox = self.components.outbox(len(snapshot))
         return Command(drive=velocity, outbox=outbox, wake=self._wake(), telemetry=telemetry, snapshot=snapshot)
+
+    def _lose_dead(self) -> None:
+        """Forget, once in each wave of the census, what robots saw of walks that it says are dead, wherever they stood."""
+        if self.completion.wave == self._wave:
+            return
+        self._wave = self.completion.wave
+        dead, proof = self.completion.told_dead, self.local_map.proof
+        if dead and proof.ready:
+            before = proof.open_arcs()
+            proof.lose(*(mark_of(node) for node in dead))
+            if proof.open_arcs() != before:
+                self.local_map.replan()
 
     @property
     def _takes_census(self) -> bool:

@@ -11,7 +11,8 @@ class CensusWave(Struct, frozen=True, array_like=True, forbid_unknown_fields=Tru
     """The sender has joined this wave by `parent` (None at the base), and waits for the neighbours in `missing`.
 
     With `again` the neighbours in `missing` that have joined must send their wave or tally again. `roster` are all
-    robots that were ever let out. `search` counts the times that the base has all robots try again what had failed.
+    robots that were ever let out. `search` counts the times that the base has all robots try again what had failed. `dead` are
+    the robots that the tally before had as dead: what they saw of walls counts no more.
     """
 
     number: Count
@@ -20,6 +21,7 @@ class CensusWave(Struct, frozen=True, array_like=True, forbid_unknown_fields=Tru
     again: bool
     roster: bytes = b""
     search: Count = 0
+    dead: bytes = b""
 
 
 class CensusTally(Struct, frozen=True, array_like=True, forbid_unknown_fields=True, tag="tally"):

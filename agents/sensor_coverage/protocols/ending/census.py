@@ -12,6 +12,9 @@ waves. A message in flight between two robots must keep one of them busy. So a c
 the first, a robot was no neighbour of any counted robot. In the second, robots lost their memory in both waves, and
 late messages of their earlier incarnations were accepted.
 
+What a dead robot saw of walls counts no more, and only robots around it know that it is dead. So a wave says who was dead
+by the tally before, and the base concludes only after a second wave that says so.
+
 A conclusion gives no information about robots that no wave reached. So tallies name the counted robots, and the robots
 that one of these declares dead. It sees the body, and its requests had no answer for longer than any living robot is
 silent. A released robot that is neither counted nor dead is `missing`. Waves and tallies carry the roster of all
@@ -56,6 +59,8 @@ class Census:
         self._dead = 0
         self._roster = 0
         self._wave_roster = 0  # as the wave brought it
+        self._wave_dead = 0  # the same, and that of the wave before
+        self._told_dead = 0
         self._number = 0
         self._parent: int | None = None
         self._joined: dict[int, None] = {}  # neighbours that have joined by another parent
@@ -82,6 +87,16 @@ class Census:
     def last(self) -> CensusTally | None:
         """The tally of the latest wave that came back to the base."""
         return self._last
+
+    @property
+    def number(self) -> int:
+        """The number of the latest wave that the robot has joined."""
+        return self._number
+
+    @property
+    def told_dead(self) -> tuple[int, ...]:
+        """The robots that this wave says are dead, ascending."""
+        return members(self._wave_dead)
 
     @property
     def missing(self) -> tuple[int, ...]:
@@ -134,6 +149,7 @@ class Census:
             # Set back to zero when a wave comes back.
             self._doublings = min(self._doublings + 1, DOUBLINGS_MAX)
             self._wave_roster = self._roster
+            self._told_dead, self._wave_dead = self._wave_dead, 0 if self._last is None else from_bytes(self._last.dead)
             return self._join(max(self._number + 1, int(now_s * TICKS_PER_S)), None, now_s)
         if self._number == 0 or self._counted is not None or now_s < self._poll_at_s:
             return []
@@ -147,6 +163,7 @@ class Census:
             self.search = max(self.search, wave.search)
             self._wave_roster = from_bytes(wave.roster)
             self._roster |= self._wave_roster
+            self._wave_dead = from_bytes(wave.dead)
             return self._join(wave.number, sender, now_s)
         if wave.number != self._number:
             return []
@@ -173,7 +190,8 @@ class Census:
         return [Outgoing(None, self._wave(self._missing(), again))]
 
     def _wave(self, missing: tuple[int, ...], again: bool) -> CensusWave:
-        return CensusWave(self._number, self._parent, missing, again, to_bytes(self._roster), self.search)
+        roster, dead = to_bytes(self._roster), to_bytes(self._wave_dead)
+        return CensusWave(self._number, self._parent, missing, again, roster, self.search, dead)
 
     def _missing(self) -> tuple[int, ...]:
         return tuple(node for node in self._listed if node not in self._joined and node not in self._tallies)
@@ -209,5 +227,6 @@ class Census:
             and before.claims == counted.claims == 0
             and before.incarnations == counted.incarnations
             and counted.disturbed < before.number
+            and not dead & ~self._told_dead
         )
         return []

@@ -49,6 +49,16 @@ class CompletionProtocol(Component):
         return self._census.missing
 
     @property
+    def wave(self) -> int:
+        """The number of the latest wave."""
+        return self._census.number
+
+    @property
+    def told_dead(self) -> tuple[int, ...]:
+        """The robots that the latest wave says are dead."""
+        return self._census.told_dead
+
+    @property
     def search(self) -> int:
         """The number of times that all robots were to try again what had failed."""
         return self._census.search

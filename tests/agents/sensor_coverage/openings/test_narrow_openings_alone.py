@@ -4,6 +4,7 @@ import pytest
 from halls import EXACT, NOISE, carry_out
 
 ALONE = (EXACT, "services.path=gradient")
+WITNESS = ("services.path=gradient", "time.duration_s=600.0")
 
 
 @pytest.mark.parametrize(
@@ -14,6 +15,7 @@ ALONE = (EXACT, "services.path=gradient")
         pytest.param(13, True, ALONE, id="a body in a door of 1.8 bodies"),
         pytest.param(112, True, ALONE, id="a body in a corner of 1.5 bodies between two walks"),
         pytest.param(504, True, (*ALONE, NOISE), id="noise, triangles that cross in front of a bend of 1.4 bodies"),
+        pytest.param(504, True, WITNESS, id="a robot that saw a walk and died in a bend of 1.4 bodies"),
         pytest.param(38, False, ALONE, id="a robot in a door beside which another one touched the wall"),
     ],
 )

@@ -24,6 +24,7 @@ class Swarm:
         self.graph = graph
         self.claims = dict.fromkeys(graph, 0)
         self.busy = dict.fromkeys(graph, False)
+        self.dead: dict[int, tuple[int, ...]] = dict.fromkeys(graph, ())
         self.random = np.random.Generator(np.random.Philox(seed))
         self.loss, self.delay_ticks, self.copies = loss, delay_ticks, copies
         self.robots = {node: self.made(node) for node in graph}
@@ -42,7 +43,7 @@ class Swarm:
         arrived = [each for each in self.under_way if each[0] <= self.ticks]
         self.under_way = [each for each in self.under_way if each[0] > self.ticks]
         for node, robot in self.robots.items():
-            robot.update(self.graph[node], self.claims[node], self.busy[node])
+            robot.update(self.graph[node], self.claims[node], self.busy[node], self.dead[node])
         for _, sender, receiver, message in arrived:
             self.send(receiver, self.robots[receiver].receive(sender, message, self.now_s))
         for node, robot in self.robots.items():
@@ -293,3 +294,20 @@ def test_a_tally_counts_the_open_arcs_of_all_robots() -> None:
             base.receive(1, answer, 0.0)
     assert base.last is not None
     assert (base.last.robots, base.last.claims, base.last.unproven) == (2, 0, 3)
+
+
+def test_every_robot_learns_who_is_dead_and_can_claim_a_frontier_before_the_base_concludes() -> None:
+    """The far end of a chain sees a dead robot. A robot that relied on it claims a frontier once it has learned that."""
+    quiet = Swarm(chain(6), seed=1)
+    assert quiet.until_concluded(200)
+    swarm = Swarm(chain(6), seed=1)
+    swarm.dead[5] = (9,)
+    assert swarm.until_concluded(200)
+    assert all(robot.told_dead == (9,) for robot in swarm.robots.values())
+    assert swarm.ticks == quiet.ticks + EVERY_S / 0.5, "one wave more"
+    swarm = Swarm(chain(6), seed=1)
+    swarm.dead[5] = (9,)
+    for _ in range(400):
+        swarm.claims[3] = int(swarm.robots[3].told_dead == (9,))
+        swarm.step()
+        assert not swarm.robots[0].concluded
