@@ -256,14 +256,15 @@ class WallWalks:
     def _measure(self, leader: int, origin: int, walked: Walked, way: Sequence[Waypoint]) -> None:
         """Find the distances of the leader's new slot to the robots in view, by their bearings along its way and odometry.
 
-        Its distance to the slot `origin` is that of the end of the way, where it walked last.
+        Where these do not show the distance to the slot `origin`, it is that of the way from there: the robot that stands there
+        now may stand beside the place that the leader left.
         """
         slot_of, length_m = self._slots.slot_of(), self._slots.length_m
         here = slot_of[leader]
-        for node, length in distances_m(way).items():
-            if node in slot_of:
-                length_m[here, slot_of[node]] = length_m[slot_of[node], here] = length
-        if origin in self._slots.occupant:
+        measured = {slot_of[node]: length for node, length in distances_m(way).items() if node in slot_of}
+        for slot, length in measured.items():
+            length_m[here, slot] = length_m[slot, here] = length
+        if origin in self._slots.occupant and origin not in measured:
             length_m[here, origin] = length_m[origin, here] = math.hypot(walked.x_m, walked.y_m)
 
     def _order(self, robot: int, command: ToWall | FollowWall | Probe) -> Routine[Walked | None]:

@@ -168,7 +168,7 @@ def test_the_base_concludes_from_the_census_once_all_robots_are_quiet(
 class Hurried(Census):
     """A negative control: ignores robots that were disturbed between two waves."""
 
-    def update(self, neighbours: list[int], claims: int, busy: bool) -> None:  # type: ignore[override]
+    def update(self, neighbours: list[int], claims: int, busy: bool, dead: tuple[int, ...] = ()) -> None:  # type: ignore[override]
         super().update(neighbours, 0, False)
         self._claims = claims
 
