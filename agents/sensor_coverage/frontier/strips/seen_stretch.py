@@ -75,6 +75,7 @@ class SeenStretch:
         self._steps: list[SeenStep] = []
         self._touches: list[SeenTouch] = []
         self._edges: list[SightEnd] = []
+        self._hiding: list[SightEnd] | None = None  # until something changes
         self._arcs: tuple[object, list[Arc]] | None = None
 
     def extend(self, stretch: FollowedStretch) -> bool:
@@ -91,7 +92,7 @@ class SeenStretch:
     def add(self, step: SeenStep) -> None:
         """Take in a step."""
         self._steps.append(step)
-        self._arcs = None
+        self._arcs = self._hiding = None
 
     def add_touch(self, touch: SeenTouch) -> None:
         """Take in a contact of the walking robot with the slot's robot. It counts at an end of the stretch."""
@@ -101,13 +102,14 @@ class SeenStretch:
     def add_edge(self, edge: SightEnd) -> None:
         """Take in a direction in which the slot lost sight of the walking robot, or saw it first."""
         self._edges.append(edge)
+        self._hiding = None
 
     def lose(self, slots: Collection[int]) -> None:
         """Forget the points that one of these slots saw."""
         self._edges = [left for each in self._edges if (left := each.without(slots)) is not None]
         self._steps = [each for each in self._steps if not any(slot in each.seen for slot in slots)]
         self._touches = [each for each in self._touches if not any(slot in each.seen for slot in slots)]
-        self._arcs = None
+        self._arcs = self._hiding = None
 
     def arcs(self, standing: Collection[int], contacts: tuple[float, ...] = ()) -> list[Arc]:
         """Return the arcs that are closed while these slots stand. `contacts` are directions [rad] of walls in touch."""
@@ -142,8 +144,10 @@ class SeenStretch:
         in front of the wall would have hidden the robot, and the wall itself hides what is behind it. So it is where a robot
         goes round an obstacle several times, and its walk ends somewhere beside it.
         """
-        passed = self._passed() if self._edges else []
-        return [each for each in self._edges if not contains(passed, beside_edge(each))]
+        if self._hiding is None:
+            passed = self._passed() if self._edges else []
+            self._hiding = [each for each in self._edges if not contains(passed, beside_edge(each))]
+        return self._hiding
 
     def _passed(self) -> list[Arc]:
         """Return the directions that the walking robot passed in sight, an arc for each part of the way without a break."""

@@ -176,9 +176,9 @@ class RobotsInReach:
             ]
             if node in seen_before and far[-1]:
                 out_of_reach[node] = None
-            last = self._touches.get(node)
+            last, is_new = self._touches.get(node), node not in seen_before
             if last is None:
-                touches[node] = _Touch(1, node not in seen_before, node not in seen_before or any(far))
+                touches[node] = _Touch(1, is_new, is_new or any(far))
             else:
                 is_beyond = any(far) if last.steps == 1 and last.is_new else last.is_beyond
                 touches[node] = _Touch(last.steps + 1, last.is_new, is_beyond and last.steps < STEPS_MAX)

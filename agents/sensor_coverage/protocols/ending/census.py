@@ -60,7 +60,7 @@ class Census:
         self._roster = 0
         self._wave_roster = 0  # as the wave brought it
         self._wave_dead = 0  # the same, and that of the wave before
-        self._told_dead = 0
+        self._dead_before = 0
         self._number = 0
         self._parent: int | None = None
         self._joined: dict[int, None] = {}  # neighbours that have joined by another parent
@@ -149,7 +149,10 @@ class Census:
             # Set back to zero when a wave comes back.
             self._doublings = min(self._doublings + 1, DOUBLINGS_MAX)
             self._wave_roster = self._roster
-            self._told_dead, self._wave_dead = self._wave_dead, 0 if self._last is None else from_bytes(self._last.dead)
+            self._dead_before, self._wave_dead = (
+                self._wave_dead,
+                0 if self._last is None else from_bytes(self._last.dead),
+            )
             return self._join(max(self._number + 1, int(now_s * TICKS_PER_S)), None, now_s)
         if self._number == 0 or self._counted is not None or now_s < self._poll_at_s:
             return []
@@ -227,6 +230,6 @@ class Census:
             and before.claims == counted.claims == 0
             and before.incarnations == counted.incarnations
             and counted.disturbed < before.number
-            and not dead & ~self._told_dead
+            and not dead & ~self._dead_before
         )
         return []

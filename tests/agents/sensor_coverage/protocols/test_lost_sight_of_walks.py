@@ -35,16 +35,23 @@ def opened(proof: SlotProof) -> list[tuple[int, int]]:
 
 
 def follow(
-    proof: SlotProof, walk: int, directions_deg: tuple[int, ...], hidden: tuple[tuple[int, ...], ...] = ()
+    proof: SlotProof,
+    walk: int,
+    directions_deg: tuple[int, ...],
+    hidden: tuple[tuple[int, ...], ...] = (),
+    tracker: StretchTracker | None = None,
+    first: int = 1,
 ) -> bool:
     """Let a robot with the wall at its right hand pass slot 7 in these directions; it was hidden before.
+
+    With a `tracker` of its way before the points continue from the number `first`.
 
     Return whether less is open after the last point.
     """
     last: WallStep | None = None
     smaller = False
-    tracker = StretchTracker(-1, 0.0)
-    for number, each in enumerate(directions_deg, 1):
+    tracker = tracker or StretchTracker(-1, 0.0)
+    for number, each in enumerate(directions_deg, first):
         point = WalkPoint({7: math.radians(each), SEER: 0.0}, (math.radians(each),), ())
         tracker.take(number, point.at, point.walls, (), (7, SEER))
         step = WallStep(None if last is None else last.point, point, -1, (), number)
@@ -151,18 +158,10 @@ def test_an_edge_is_open_only_where_the_walk_did_not_pass_in_sight(over: bool, p
     """The robot goes round an obstacle twice, and stops in front of slot 7. Then it leaves."""
     proof = SlotProof()
     look(proof)
-    tracker, last = StretchTracker(-1, 0.0), None
-    rounds = [(150, 200, 250, 318, 330), (150, 200, 250)] if passes_in_sight else [(250, 318, 330), (150, 200, 250)]
-    number = 0
-    for each_round in rounds:
-        for each in each_round:
-            number += 1
-            point = WalkPoint({7: math.radians(each), SEER: 0.0}, (math.radians(each),), ())
-            tracker.take(number, point.at, point.walls, (), (7, SEER))
-            step = WallStep(None if last is None else last.point, point, -1, (), number)
-            proof.pass_step(WALK, last, step, tracker.latest)
-            last = step
-        last = None
+    tracker, number = StretchTracker(-1, 0.0), 0
+    for each_round in [(150, 200, 250, 318, 330) if passes_in_sight else (250, 318, 330), (150, 200, 250)]:
+        follow(proof, WALK, each_round, tracker=tracker, first=number + 1)
+        number += len(each_round)
         proof.lose_sight(WALK, number + 1, (2,))
     if over:
         proof.end_walk(WALK, number, 2)
