@@ -98,6 +98,7 @@ class LocalNode(Controller):
             return
         self._wave = self.completion.wave
         dead, proof = self.completion.told_dead, self.local_map.proof
+        self.situation.told_dead = dead
         if dead and proof.ready:
             before = proof.open_arcs()
             proof.lose(*(mark_of(node) for node in dead))

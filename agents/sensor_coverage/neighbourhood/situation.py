@@ -77,6 +77,7 @@ class Situation:
         self.motion.rest = 0.0, 0.0
         self.failure_detector = FailureDetector()
         self.said_dead: dict[int, None] = {}  # robots that others have found to be dead, for the present walk
+        self.told_dead: tuple[int, ...] = ()  # robots that are dead by the latest wave of the census
         self.wall_walk = WallWalk(self.motion, ChainMap(self.failure_detector.dead, self.said_dead))
         planner_parameters = PlannerParameters(
             link_m=parameters.link_m, margin_m=parameters.margin_m, walls=parameters.walls

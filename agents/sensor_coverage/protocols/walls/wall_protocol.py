@@ -11,7 +11,6 @@ from typing import ClassVar, Final, NamedTuple, Protocol
 
 from zwerm.agents.sensor_coverage.frontier.decisions import SlotCoverageProof
 from zwerm.agents.sensor_coverage.frontier.directions import wrapped
-from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStretch, StretchEnd
 from zwerm.agents.sensor_coverage.frontier.strips.stretches import StretchTracker
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     BLIND_MAX,
@@ -26,7 +25,6 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
 from zwerm.agents.sensor_coverage.messages.peers import CHANNEL
-from zwerm.agents.sensor_coverage.messages.pushes import ProvedArc, WalkTriangle
 from zwerm.agents.sensor_coverage.messages.walls import (
     ArcClosed,
     DeadInSight,
@@ -34,12 +32,11 @@ from zwerm.agents.sensor_coverage.messages.walls import (
     PassedPoint,
     WalkMessage,
     WalkOver,
-    WallEnd,
-    WallStretch,
 )
 from zwerm.agents.sensor_coverage.protocols.component import Component, Outgoing
 from zwerm.agents.sensor_coverage.protocols.walls.kept_points import KeptPoints, Neighbourhood
 from zwerm.agents.sensor_coverage.protocols.walls.sightlines import RESENT_POINTS, Sightlines
+from zwerm.agents.sensor_coverage.protocols.walls.wall_records import message_of, proved_arc, stretch_of
 
 # A robot makes plans again this many ticks after the latest point that closed something: the walk has passed.
 PASSED_TICKS: Final = 10
@@ -84,6 +81,10 @@ class WalkSituation(Protocol):
     @property
     def said_dead(self) -> dict[int, None]:
         """The robots that others have found to be dead, for the present walk."""
+
+    @property
+    def told_dead(self) -> tuple[int, ...]:
+        """The robots that are dead by the latest wave of the census."""
 
     @property
     def node(self) -> int:
@@ -249,15 +250,17 @@ class WallProtocol(Component):
 
     def _pass(self, sender: int, passed: PassedPoint, slots: Mapping[int, int], tick: int) -> None:
         """Take a point into the proof of this robot's slot; `slots` has the slots of the robots that count."""
-        local_map, slot = self._situation.local_map, self._situation.local_map.slot
+        situation, local_map, slot = self._situation, self._situation.local_map, self._situation.local_map.slot
+        # A robot that was dead before the walk is no witness, although the walking robot sees its body.
+        gone = {*situation.dead, *situation.told_dead}
         point = WalkPoint(
             {slots[node]: direction for node, direction in passed.seen if node in slots},
             passed.walls,
             tuple(slots.get(node, NOWHERE) for node in passed.robots),
-            unplaced=tuple(mark_of(node) for node, _ in passed.seen if node not in slots),
+            unplaced=tuple(mark_of(node) for node, _ in passed.seen if node not in slots and node not in gone),
             at=passed.at,
         )
-        stretch = None if passed.stretch is None else _stretch_of(passed.stretch, slots)
+        stretch = None if passed.stretch is None else stretch_of(passed.stretch, slots)
         if stretch is not None:
             local_map.proof.extend(passed.push, stretch)
         if slot not in point.seen:
@@ -293,7 +296,7 @@ class WallProtocol(Component):
             self._proves
             and local_map.proof.ready
             and local_map.slot == message.slot
-            and local_map.proof.accept(_proved_arc(message))
+            and local_map.proof.accept(proved_arc(message))
         ):
             self._replan_at = tick + PASSED_TICKS
 
@@ -313,7 +316,7 @@ class WallProtocol(Component):
         proof, slots = self._situation.local_map.proof, self._slots()
         for over in self._ended:
             for number, each in enumerate(over.stretches, 1):
-                stretch = _stretch_of(each, slots)
+                stretch = stretch_of(each, slots)
                 if number == len(over.stretches) and over.end != NOWHERE:
                     stretch = stretch.tied_at_end(over.end)
                 if proof.extend(over.push, stretch):
@@ -372,29 +375,3 @@ def _witnesses(
         if not any(each in found for each in known):
             found[known[0]] = None
     return tuple(sorted(found))
-
-
-def message_of(stretch: FollowedStretch) -> WallStretch:
-    """Return the message of a stretch whose ends name robots."""
-    first, last = (WallEnd(*each) for each in (stretch.first, stretch.last))
-    return WallStretch(stretch.first_number, stretch.last_number, first, last, stretch.radius_m)
-
-
-def _stretch_of(message: WallStretch, slots: Mapping[int, int]) -> FollowedStretch:
-    """Return the stretch of a message, with the slots of robots, as far as known."""
-    first, last = (
-        StretchEnd(
-            each.at,
-            each.touched,
-            tuple(slots[node] for node in each.robots if node in slots),
-            tuple(slots[node] for node in each.seen if node in slots),
-        )
-        for each in (message.first, message.last)
-    )
-    return FollowedStretch(message.first_number, message.last_number, first, last, message.radius_m)
-
-
-def _proved_arc(message: NeighbourProved) -> ProvedArc:
-    """Return the arc of a message."""
-    needed, seen, start_rad, width_rad, triangle = message.arc
-    return ProvedArc(needed, seen, start_rad, width_rad, None if triangle is None else WalkTriangle(*triangle))

@@ -7,6 +7,7 @@ import pytest
 
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.strips.stretches import StretchTracker
+from zwerm.agents.sensor_coverage.frontier.wall_proof import mark_of
 from zwerm.agents.sensor_coverage.local_node import MAKERS
 from zwerm.agents.sensor_coverage.messages.beacons import NO_PATH_VECTOR, SeenRobot, StateBeacon
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
@@ -14,7 +15,8 @@ from zwerm.agents.sensor_coverage.messages.pushes import ProvedArc
 from zwerm.agents.sensor_coverage.messages.walls import ArcClosed, DeadInSight, NeighbourProved, PassedPoint
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
 from zwerm.agents.sensor_coverage.protocols.component import Outgoing
-from zwerm.agents.sensor_coverage.protocols.walls.wall_protocol import WallProtocol, message_of
+from zwerm.agents.sensor_coverage.protocols.walls.wall_protocol import WallProtocol
+from zwerm.agents.sensor_coverage.protocols.walls.wall_records import message_of
 
 # The robot, its neighbour in the east, and the walking robot, which follows a wall in the south from west to east; their slots.
 # Another robot takes the slot of the neighbour over.
@@ -45,6 +47,7 @@ class Here:
         self.hear_neighbour(1, 3)
         self.local_map.receive(WALKER, state(WALKER, 1, 2, True), 0)
         self.dead, self.said_dead = dict[int, None](), dict[int, None]()
+        self.told_dead: tuple[int, ...] = ()
         self.walls = WallProtocol(self)
         self.walk = StretchTracker(-1, self.radius_m)
         self.sees = dict[int, float]()
@@ -187,6 +190,19 @@ def test_points_that_a_robot_without_a_slot_saw_count_until_it_is_dead() -> None
     assert here.closed_deg == pytest.approx(40.0)
     here.local_map.remove_dead(BODY)
     assert here.closed_deg == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize(("told", "closed_deg"), [((), 0.0), ((BODY,), 40.0)])
+def test_a_robot_that_was_dead_before_the_walk_is_no_witness(told: tuple[int, ...], closed_deg: float) -> None:
+    """Each wave of the census says who is dead: what such a walk closed stays closed."""
+    here = Here()
+    here.look()
+    here.local_map.update_proof()
+    here.told_dead = told
+    seen_body(here, 1, -70.0, True, False, sees=True)
+    seen_body(here, 2, -30.0, True, False, sees=True)
+    here.local_map.proof.lose(mark_of(BODY))
+    assert here.closed_deg == pytest.approx(closed_deg)
 
 
 def test_a_walking_robot_is_told_once_which_robots_in_sight_are_dead() -> None:
