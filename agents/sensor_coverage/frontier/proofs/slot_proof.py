@@ -13,6 +13,7 @@ from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStre
 from zwerm.agents.sensor_coverage.frontier.strips.seen_stretch import SeenStep, SeenStretch, SeenTouch
 from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import (
     SightEnd,
+    is_passed,
     united_round,
     within_ends,
     without_edges,
@@ -29,8 +30,8 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     arcs_of_step,
     arcs_of_walls,
     complement,
+    contains,
     ends_at,
-    united,
 )
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.agents.sensor_coverage.messages.pushes import LostSight, ProvedArc, WalkTriangle
@@ -132,7 +133,8 @@ class SlotProof:
         # A station cannot look behind what it touches. Nobody saw how a wall close to the slot goes on at the ends of its arc.
         contacts = self._at_walls if self._slot == 0 else self._contacts
         near = [within_ends(each) for each in united_round(self._near)]
-        loose = [each for each in self._edges if not each.witnesses]
+        ways = [within_ends(each) for each in self._near]
+        loose = [each for each in self._edges if not (each.witnesses or is_passed(each, ways))]
         edged = [arc for each in stretches for arc in each.edged_arcs(standing, touched)]
         edged += without_edges([*contacts, *near], loose)
         return complement([*self._by_view, *fans, *self._by_walks.counting(standing), *edged])
@@ -323,9 +325,10 @@ class SlotProof:
             self._touches[walk] = [each for each in touches if not any(slot in each.seen for slot in slots)]
 
     def add_near(self, arcs: Iterable[tuple[float, float]]) -> None:
-        """Add arcs (start, width) [rad] in which a wall close to the slot was followed."""
+        """Add arcs (start, width) [rad] in which a wall close to the slot was followed. Those of different walks stay apart."""
         self._open = None
-        self._near = united([*self._near, *(Arc(*each) for each in arcs)])
+        fresh = [each for each in united_round(Arc(*each) for each in arcs) if not contains(self._near, each)]
+        self._near = [*(each for each in self._near if not contains(fresh, each)), *fresh]
 
     def edges(self) -> tuple[LostSight, ...]:
         """Return the edges of sight, for the slot's next occupant: the latest ones, as far as they name few slots."""

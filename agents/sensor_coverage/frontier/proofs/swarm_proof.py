@@ -23,6 +23,7 @@ from zwerm.agents.sensor_coverage.frontier.strips.crossings import (
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import Pocket
 from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import (
     SightEnd,
+    is_passed,
     shortened,
     with_islands,
     without_edges,
@@ -307,7 +308,8 @@ class SwarmProof:
             crossings.setdefault(first_number, []).extend(crossings_of_pocket(hand, pocket, is_loose))
         by_stretch = self._by_stretch[slot] = {number: arcs_into(each) for number, each in crossings.items()}
         all_edges = [edge for each in edges.values() for edge in each]
-        edged = without_edges([*contacts, *shortened(around.near)], all_edges)
+        near = shortened(around.near)
+        edged = without_edges([*contacts, *near], [each for each in all_edges if not is_passed(each, near)])
         found = [*contacts, *(each.arc for each in around.near)]
         for stretch, each in by_stretch.items():
             found += each

@@ -10,7 +10,13 @@ from zwerm.agents.sensor_coverage.frontier.strips.crossings import (
     crossings_of_step,
 )
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStretch, Pocket, StretchEnd
-from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import SightEnd, beside_edge, united_round, without_edges
+from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import (
+    SightEnd,
+    beside_edge,
+    is_passed,
+    united_round,
+    without_edges,
+)
 from zwerm.agents.sensor_coverage.frontier.strips.stretches import pocket_of
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     Arc,
@@ -18,7 +24,6 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     WalkPoint,
     arc_between,
     arcs_into,
-    contains,
     overlap,
     shared_arcs,
 )
@@ -146,7 +151,7 @@ class SeenStretch:
         """
         if self._hiding is None:
             passed = self._passed() if self._edges else []
-            self._hiding = [each for each in self._edges if not contains(passed, beside_edge(each))]
+            self._hiding = [each for each in self._edges if not is_passed(each, passed)]
         return self._hiding
 
     def _passed(self) -> list[Arc]:

@@ -17,6 +17,7 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     NearArc,
     WalkPoint,
     complement,
+    contains,
     overlap,
     united,
 )
@@ -73,6 +74,14 @@ def without_edges(arcs: Iterable[Arc], ends: Iterable[SightEnd]) -> list[Arc]:
 def beside_edge(end: SightEnd) -> Arc:
     """Return the arc of the directions beside an edge of sight."""
     return Arc(end.direction_rad - BESIDE_EDGE_RAD, 2.0 * BESIDE_EDGE_RAD)
+
+
+def is_passed(end: SightEnd, followed: Iterable[Arc]) -> bool:
+    """Return whether one of these arcs contains all directions beside an edge of sight.
+
+    Each arc is of one walk along a wall, without a break: then nothing is hidden behind the edge.
+    """
+    return contains(followed, beside_edge(end))
 
 
 def united_round(arcs: Iterable[Arc]) -> list[Arc]:

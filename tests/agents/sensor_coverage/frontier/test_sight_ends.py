@@ -77,6 +77,21 @@ def test_a_wall_close_to_a_slot_ends_where_its_robot_turned_back(hand: int, open
     assert sorted(open_at_0(BEYOND, near=(near, NearArc(arc(150, 160), -hand)))) == opened
 
 
+@pytest.mark.parametrize(
+    ("near", "opened"),
+    [
+        pytest.param((arc(235, 265),), [(330, 150)], id="one walk passes the edge"),
+        pytest.param((arc(220, 257), arc(248, 280)), [(245, 255), (330, 150)], id="two walks meet there"),
+    ],
+)
+def test_a_robot_that_follows_the_wall_close_to_its_slot_past_an_edge_closes_it(
+    near: tuple[Arc, ...], opened: list[tuple[int, int]]
+) -> None:
+    """The walking robot stood in front of this wall when its walk ended, and has left."""
+    both = tuple(NearArc(each, -1) for each in near)
+    assert sorted(open_at_0((*BEFORE, point()), (point(), *BEYOND), near=both)) == opened
+
+
 def test_the_ends_of_what_a_slot_saw_are_found_past_points_without_a_contact() -> None:
     blind = WalkPoint({0: 0.5}, (), ())
     points = [point(_0=10), blind, point(_1=20, _2=30)]

@@ -126,6 +126,31 @@ def test_another_walk_closes_an_edge() -> None:
     assert opened(proof) == []
 
 
+@pytest.mark.parametrize(
+    ("near_deg", "is_open"),
+    [
+        pytest.param(((235, 30),), False, id="one walk passes the edge"),
+        pytest.param(((220, 38), (242, 38)), True, id="two walks meet there"),
+    ],
+)
+def test_a_robot_that_follows_the_wall_close_to_its_slot_past_an_edge_closes_it(
+    near_deg: tuple[tuple[int, int], ...], is_open: bool
+) -> None:
+    """Also for the next robot at the slot, and if the walking robot is lost that stood for what is beyond."""
+    proof, heir = SlotProof(), SlotProof()
+    look(proof)
+    follow(proof, WALK, BEFORE)
+    follow(proof, WALK + 1, BEYOND, ((4,),))
+    for start, width in near_deg:
+        proof.add_near([(math.radians(start), math.radians(width))])
+    assert opened(proof) == []
+    proof.lose(4)
+    heir.inherit(proof.memory(), proof.edges())
+    look(heir)
+    for each in (proof, heir):
+        assert bool(opened(each)) is is_open
+
+
 def test_a_wall_close_to_a_slot_ends_where_its_robot_turned_back() -> None:
     proof = SlotProof()
     look(proof)
