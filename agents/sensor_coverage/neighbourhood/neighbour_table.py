@@ -72,6 +72,7 @@ class NeighbourTable:
         """Take in a neighbour's state; return whether the average of its bearing no longer holds."""
         known = self.states.get(sender)
         self.received_at[sender] = tick
+        heard_here = self._heard_in.get(sender) == self.epoch
         self._heard_in[sender] = self.epoch
         if known is not None and state.number <= known.number:
             return False
@@ -84,8 +85,9 @@ class NeighbourTable:
         if state.slot in self._handovers and not state.moving:
             del self._handovers[state.slot]
         left = known is not None and (state.moving or known.slot != state.slot)
-        held = known is not None and _held(known) != NOWHERE and not known.moving
-        if known is not None and left and held and sender in self.seen:
+        held = known is not None and _held(known) not in (NOWHERE, self.slot) and not known.moving
+        # Of a robot that was heard before this robot's latest drive, this robot may not see who takes its slot over.
+        if known is not None and left and held and heard_here and sender in self.seen:
             self._handovers[known.slot] = tick
         # A robot that has just driven was perhaps averaged on its way: its neighbours do not know that it moves.
         drove = known is None or state.epoch != known.epoch or (known.moving and not state.moving)

@@ -235,6 +235,27 @@ def test_a_bearing_of_a_robot_that_may_have_been_on_its_way_belongs_to_no_drive(
     assert watcher.seen[9].epoch == epoch
 
 
+@pytest.mark.parametrize(
+    ("slot", "drives", "waits"),
+    [
+        pytest.param(4, False, True, id="a slot in sight passes to another robot"),
+        pytest.param(4, True, False, id="the robot was heard before the watcher moved"),
+        pytest.param(1, False, False, id="the watcher has taken the slot itself"),
+    ],
+)
+def test_a_robot_waits_for_a_slot_that_passes_on_in_its_sight(slot: int, drives: bool, waits: bool) -> None:
+    """Of a slot that it does not see it would never receive a message, and wait for nothing."""
+    watcher = LocalMap(7, PlannerParameters(), MAKERS)
+    watcher.occupy(1)
+    watcher.receive(8, StateBeacon(1, slot, 3, False, False, 1, (), (), (), NO_PATH_VECTOR), 0)
+    if drives:
+        watcher.begin_drive()
+        watcher.end_drive()
+    watcher.update_bearings({8: 0.5})
+    watcher.receive(8, StateBeacon(2, 5, 4, False, False, 1, (), (), (), NO_PATH_VECTOR), 1)
+    assert (watcher.handovers_until is not None) is waits
+
+
 def test_the_next_robot_at_a_slot_inherits_the_distances_that_a_walk_measured() -> None:
     first, second = (LocalMap(node, PlannerParameters(), MAKERS) for node in (7, 8))
     first.occupy(4)
