@@ -17,6 +17,7 @@ from zwerm.world.bodies import Velocities
 from zwerm.world.bodies.approach import ApproachLimit, Meeting
 from zwerm.world.bodies.engine_calls import reader, substeps
 from zwerm.world.bodies.parking import FEW_BODIES, SEARCH_TICKS, Parking
+from zwerm.world.geometry.segments import Segments
 from zwerm.world.scene import Bools, Floats, Ints
 
 # Iterations of the contact solver in each substep; a disc in the plane seldom touches more than four others.
@@ -25,6 +26,9 @@ _SWEEPS: Final = 4
 # The fraction of an overlap that remains after one substep, and the overlap that the solver ignores [m].
 _OVERLAP_LEFT_FRACTION: Final = 0.1
 _OVERLAP_IGNORED_M: Final = 1e-5
+# Ticks for which a body that was added may push others through walls: it may overlap them by a whole body, and the solver
+# knows no way in between.
+_SHOVING_TICKS: Final = 10
 
 _FORCE: Final = batch.BodyFields.FORCE | batch.BodyFields.TORQUE
 _VELOCITY: Final = batch.BodyFields.VELOCITY
@@ -45,6 +49,8 @@ class Physics:
         self._space = _make_space(self._substep_s, body.friction, segments)
         self._bodies: dict[int, pymunk.Body] = {}
         self._present: Bools = np.zeros(count, dtype=np.bool_)
+        self._walls = Segments.of(segments)
+        self._shoving = 0  # ticks for which a body may be pushed through a wall
         # Contact, the way of both bodies until the next search, and half a body more for what the solver adds.
         self._parking = Parking(count, 3.0 * body.radius_m + 2.0 * body.max_speed_m_s * dt_s * SEARCH_TICKS)
         self._approach = (
@@ -84,6 +90,7 @@ class Physics:
         self.position[robot] = position
         self.heading[robot] = heading
         self._arranged = False
+        self._shoving = _SHOVING_TICKS if self._table.collide else 0
 
     def fix(self, robot: int, position: Floats, heading: float) -> None:
         """Put a robot into the arena that never moves and never collides: a base station."""
@@ -193,6 +200,9 @@ class Physics:
         self._read_poses()
         poses = np.frombuffer(self._poses.float_buf(), dtype=np.float64).reshape(-1, 3)[rows]
         place, angle = poses[:, :2], poses[:, 2]
+        if self._shoving:
+            self._shoving -= 1
+            place = self._kept_inside(here, place)
         differs = here != place
         moved[ids] = differs[:, 0] | differs[:, 1] | (heading != angle)
         self.position[ids] = place
@@ -201,6 +211,20 @@ class Physics:
         if may_park:
             self._parking.note_moved(moved)
         return moved
+
+    def _kept_inside(self, here: Floats, there: Floats) -> Floats:
+        """Return the places (k, 2) [m] to which bodies moved in this tick; one that crossed a wall is put back."""
+        crossing = np.flatnonzero(self._walls.crossed(here, there))
+        if not len(crossing):
+            return there
+        self._shoving = _SHOVING_TICKS
+        kept = there.copy()
+        kept[crossing] = here[crossing]
+        for robot, (x, y) in zip(
+            np.arange(len(self.position))[self._ids][crossing].tolist(), kept[crossing].tolist(), strict=True
+        ):
+            self._bodies[robot].position = x, y
+        return kept
 
     def _integrate_approaching(self, meeting: Meeting) -> None:
         """Integrate one tick, in which the bodies of `meeting` approach each other no faster than they may."""

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 
 class Segments(NamedTuple):
@@ -31,3 +32,15 @@ class Segments(NamedTuple):
         # As np.clip, which is slower.
         along = np.minimum(np.maximum(((x - px) * ex + (y - py) * ey) / self.length2[which], 0.0), 1.0)
         return px + along * ex, py + along * ey
+
+    def crossed(self, here: Floats, there: Floats) -> Bools:
+        """Return (k,) which of the ways from `here` to `there` (k, 2) [m] cross a segment."""
+        x, y = here[:, :1], here[:, 1:]
+        vx, vy = there[:, :1] - x, there[:, 1:] - y
+        across = vx * self.ey - vy * self.ex
+        way = (self.px - x) * self.ey - (self.py - y) * self.ex  # times `across`: along the way, and along the segment
+        along = (self.px - x) * vy - (self.py - y) * vx
+        sign, size = np.sign(across), np.abs(across)
+        met = (sign * way > 0.0) & (sign * way <= size) & (sign * along >= 0.0) & (sign * along <= size)
+        crossed: Bools = np.logical_or.reduce(met & (size > 0.0), axis=1)
+        return crossed
