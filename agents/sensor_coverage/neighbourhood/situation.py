@@ -47,16 +47,16 @@ RECOVERY_TICKS: Final = 100
 RECOVERIES_MAX: Final = 4
 # Ticks that a standing robot sees no robot before it drives back on its way: one may be on its way to it.
 ALONE_TICKS: Final = 200
-
 # A dead robot's body within this angle [rad] of a drive's direction may stop the drive.
 BODY_AHEAD_RAD: Final = 0.3
 # A robot in touch within this angle [rad] of a drive's direction has stopped the drive.
 BODY_BESIDE_RAD: Final = math.pi / 2.0
 # A robot that pushes so many bodies still has a quarter of its speed, and does not count as stuck.
 PUSHED_MAX: Final = 3
-
-# A robot within this distance [m] of the point where it came out of the depot still stands there.
+# A robot within the first distance [m] of the point where it came out of the depot still stands there. Up to the second one it
+# does as long as it sees the first robot of a path: it gives way to a robot that stands close to the base.
 AT_BASE_M: Final = 0.05
+BESIDE_BASE_M: Final = 0.14
 
 
 class Situation:
@@ -358,7 +358,7 @@ class Situation:
 
     def stand(self) -> None:
         """End a drive: the robot stands still, for neighbours to average its bearing."""
-        self.check_at_base()
+        self.check_at_base(BESIDE_BASE_M)
         self.local_map.end_drive()
         self.motion.frame.forget()
 
@@ -390,11 +390,11 @@ class Situation:
 
     def _recover(self, rest: Vector) -> Drive:
         self.motion.rest = yield from self.motion.return_to_rest(rest)
-        self.check_at_base()
+        self.check_at_base(BESIDE_BASE_M)
 
-    def check_at_base(self) -> None:
+    def check_at_base(self, within_m: float = AT_BASE_M) -> None:
         """Find out whether the robot is off the base's point. Then it sees other robots than the base, and takes a slot."""
         away_m = math.hypot(self.motion.frame.x_m, self.motion.frame.y_m)
-        if self.local_map.at_base and self.local_map.heading is not None and away_m > AT_BASE_M:
+        if self.local_map.at_base and self.local_map.heading is not None and away_m > within_m:
             self.local_map.at_base = False
             self.local_map.change()
