@@ -35,7 +35,8 @@ class NeighbourTable:
     which is so after a restart. `slot` is where the robot stands. `redundant`: it has left the complex, and its body
     still stands there. `reach` has the hops to the base. `epoch` counts its drives, and `samples` its averages
     of bearings. `heading` [rad] is in the base's frame, or None if unknown. `distances_m` has the distances [m] from its slot
-    to others that are not a hop away, as a walk measured them. `version` counts all changes: between two
+    to others that are not a hop away, as a walk measured them. `odometry_moves` counts the robot's latest moves to slots, in
+    a row, at whose end too few landmarks stood. `version` counts all changes: between two
     changes, no decision changes.
     """
 
@@ -50,6 +51,7 @@ class NeighbourTable:
         self.heading: float | None = None
         self.samples = 0
         self.distances_m: dict[int, float] = {}
+        self.odometry_moves = 0
         self.version = 0
         self.states: dict[int, StateBeacon] = {}
         self.received_at: dict[int, int] = {}  # node: tick of its latest state

@@ -32,6 +32,9 @@ TELL_TICKS: Final = 4
 WALK_TICKS: Final = 1200
 # After VACATED_TICKS a follower checks this often [ticks] whether the leader's slot is vacant.
 VACANCY_PERIOD_TICKS: Final = 20
+# With noisy bearings a robot homes again after every so many moves by odometry. Homing takes 5 s, and the robots of a single
+# file do it one after the other; odometry is off by a small fraction of a hop.
+HOMED_EVERY: Final = 2
 # A leader that is visible within this angle [rad] of its slot's direction is still there, or back.
 BACK_RAD: Final = 0.3
 
@@ -154,6 +157,15 @@ class PushPart:
         """Return the approximate bearing of the robot that has taken this robot's former slot."""
         there_rad = direction_to(self._memory, self._chain.origin)
         return 0.0 if there_rad is None else wrapped(there_rad - self._heading)
+
+    def _note_move(self, result: DriveResult) -> None:
+        """Record the end of the move to the slot ahead."""
+        self._result = result
+        self._map.odometry_moves = self._map.odometry_moves + 1 if result.used_moving_landmarks else 0
+
+    def _homes_again(self, noisy: bool) -> bool:
+        """Return whether to home again, now that all landmarks stand; `noisy`: it takes long."""
+        return self._result.used_moving_landmarks and (not noisy or self._map.odometry_moves % HOMED_EVERY == 0)
 
     def _vacancy_check_due(self) -> bool:
         return self._waited > VACATED_TICKS and self._waited % VACANCY_PERIOD_TICKS == 1

@@ -249,7 +249,7 @@ class TokenPush(PushPart, WallPush):
     # --- after the drive ----------------------------------------------------------------------------------------------
 
     def _followed(self, result: DriveResult) -> None:
-        self._result = result
+        self._note_move(result)
         if not (result.used_odometry or result.used_moving_landmarks):
             self._situation.stand()
         self._enter("there")
@@ -277,7 +277,7 @@ class TokenPush(PushPart, WallPush):
     def _home(self) -> None:
         """Repeat the visual homing on landmarks that were moving and stand still now."""
         states = self._map.states
-        if not self._result.used_moving_landmarks or self._memory is None:
+        if self._memory is None or not self._homes_again(self._situation.motion.samples > 1):
             self._regain()
             return
         self._enter("homing")
