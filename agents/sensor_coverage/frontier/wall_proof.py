@@ -43,6 +43,8 @@ SAME_WALL_RAD: Final = math.radians(35.0)
 # with the wall at the side of the hand. The direction of a contact is known within 15 degrees.
 LEAVING_RAD: Final = math.radians(110.0)
 ROUNDING_RAD: Final = math.radians(150.0)
+# Between two steps the direction of a contact with the same wall, or with its end, changes by less than this [rad].
+OPPOSITE_RAD: Final = math.radians(149.0)
 # A way [m] shorter than the first has no direction. One longer than the second is not a single step.
 LEAVING_M_MIN: Final = 0.015
 LEAVING_M_MAX: Final = 0.07
@@ -243,17 +245,19 @@ def leaves_wall(hand: int, before: Collection[float], now: Collection[float], x_
     """Return whether a robot with the wall at its `hand`, +1 left, -1 right, does not follow it any more on a step (x, y) [m].
 
     `before` and `now` are the directions [rad] of walls in touch before and after the step. The robot leaves the wall if it
-    drives away from all walls before it, or if it turns round a corner and comes to a wall at its other side alone. That is
-    the opposite wall of a passage that begins at the corner: the wall that it follows stays at its hand.
+    drives away from all walls before it, if it comes to the opposite wall in a single step, or if it turns round a corner and
+    comes to a wall at its other side alone: the opposite one of a passage that begins at the corner.
     """
     if not LEAVING_M_MIN < math.hypot(x_m, y_m) < LEAVING_M_MAX:
         return False
     heading = math.atan2(y_m, x_m)
     if not before:
         return bool(now) and all(hand * math.remainder(each - heading, math.tau) < 0.0 for each in now)
-    stays = any(abs(math.remainder(a - b, math.tau)) < SAME_WALL_RAD for a in before for b in now)
+    turns = [abs(math.remainder(a - b, math.tau)) for a in before for b in now]
+    if turns and not SAME_WALL_RAD <= min(turns) <= OPPOSITE_RAD:
+        return min(turns) > OPPOSITE_RAD
     sides = [hand * math.remainder(each - heading, math.tau) for each in before]
-    return not stays and not any(-LEAVING_RAD < each < ROUNDING_RAD for each in sides)
+    return not any(-LEAVING_RAD < each < ROUNDING_RAD for each in sides)
 
 
 class SeenPoint(NamedTuple):

@@ -19,6 +19,8 @@ Vector = tuple[float, float]
 HALVINGS: Final = 12
 # Distance from the ends of a step at which it is tested, as a fraction of its length.
 INWARD: Final = 1e-3
+# Near the slot a step has many directions, and an end may be within them: they are tested this far apart [rad].
+WITHIN_RAD: Final = math.radians(5.0)
 
 
 class StretchEnd(NamedTuple):
@@ -114,16 +116,25 @@ def kept_part(
         at = start[0] + part * (end[0] - start[0]), start[1] + part * (end[1] - start[1])
         return _crosses(at, there_rad + part * step_rad, stretch_end.at, stretch_end.touched)
 
+    def edge_of(inside: float, outside: float, stretch_end: StretchEnd) -> float:
+        for _ in range(HALVINGS):
+            middle = (inside + outside) / 2.0
+            inside, outside = (inside, middle) if leaks(middle, stretch_end) else (middle, outside)
+        return inside
+
+    between = range(1, math.ceil(abs(step_rad) / WITHIN_RAD))
     for each in ends:
         first, last = leaks(low, each), leaks(high, each)
         if first and last:
             return 0.0, 0.0
         if first or last:
-            inside, outside = (high, low) if first else (low, high)
-            for _ in range(HALVINGS):
-                middle = (inside + outside) / 2.0
-                inside, outside = (inside, middle) if leaks(middle, each) else (middle, outside)
-            low, high = (inside, high) if first else (low, inside)
+            low, high = (edge_of(high, low, each), high) if first else (low, edge_of(low, high, each))
+            continue
+        within = (low + (high - low) * number / (len(between) + 1) for number in between)
+        part = next((part for part in within if leaks(part, each)), None)
+        if part is not None:  # keep the larger part beside the end
+            before, after = edge_of(low, part, each), edge_of(high, part, each)
+            low, high = (low, before) if before - low > high - after else (after, high)
     return low, high
 
 

@@ -9,7 +9,13 @@ from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.frontier.proofs.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.strips.crossings import arcs_beside_pocket
-from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStretch, Pocket, StretchEnd, touched_point
+from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import (
+    FollowedStretch,
+    Pocket,
+    StretchEnd,
+    kept_part,
+    touched_point,
+)
 from zwerm.agents.sensor_coverage.frontier.strips.stretches import pocket_of
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, Crossing, Walk, WalkPoint, arcs_into
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
@@ -174,3 +180,18 @@ def test_a_step_back_along_the_wall_closes_nothing() -> None:
     back = way_along((0.0, 0.2), EAST[:3][::-1], SOUTH, -1)
     assert closed_deg(back) == []
     assert closed_deg(way_along((0.0, 0.2), EAST[:3], SOUTH, -1)) != []
+
+
+def test_an_end_within_the_directions_of_a_step_is_cut_out() -> None:
+    """The step turns round a corner close to the slot, which looks along the wall into the passage behind it."""
+    end = StretchEnd((-0.215, 0.215), (-0.25, 0.154))
+    start, stop = (-0.086, 0.052), (-0.084, 0.101)
+    there, beyond = (math.atan2(y, x) for x, y in (start, stop))
+    low, high = kept_part(start, stop, there, beyond - there, [end])
+    for number in range(100):
+        part = low + (high - low) * (number + 0.5) / 100.0
+        direction = there + part * (beyond - there)
+        # Directions are taken to be even along the step, which is off by less than a degree.
+        assert not math.atan2(0.215, -0.215) + 0.017 < direction < math.atan2(0.154, -0.25), "past the end of the strip"
+    assert 0.0 < high - low < 1.0
+    assert kept_part(start, stop, there, beyond - there, []) == (0.0, 1.0)

@@ -336,6 +336,22 @@ def test_a_robot_that_drives_away_from_a_wall_does_not_follow_it(
 
 
 @pytest.mark.parametrize(
+    ("wall_deg", "now_deg", "way_deg", "leaves"),
+    [
+        pytest.param(-120.0, 60.0, 92.0, True, id="from one wall of a passage to the other"),
+        pytest.param(-120.0, 120.0, 92.0, False, id="round the end of a thin wall"),
+        pytest.param(-120.0, None, 92.0, False, id="round a corner behind"),
+    ],
+)
+def test_a_robot_that_comes_to_the_opposite_wall_in_one_step_does_not_follow_the_first(
+    wall_deg: float, now_deg: float | None, way_deg: float, leaves: bool
+) -> None:
+    """It was pushed across the passage in front of another robot, with the first wall almost behind it."""
+    way, now = math.radians(way_deg), () if now_deg is None else (math.radians(now_deg),)
+    assert leaves_wall(1, (math.radians(wall_deg),), now, 0.05 * math.cos(way), 0.05 * math.sin(way)) is leaves
+
+
+@pytest.mark.parametrize(
     ("walls_deg", "leaves"),
     [
         pytest.param((80.0,), False, id="the wall goes on beyond the corner"),
