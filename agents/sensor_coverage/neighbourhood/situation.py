@@ -41,8 +41,7 @@ from zwerm.agents.sensor_coverage.protocols.leave_negotiation import LeaveNegoti
 from zwerm.agents.sensor_coverage.protocols.transport.mailbox import ReliableMailbox
 from zwerm.wire.messages import BodyVelocity, Observation
 
-# A robot that is displaced again within so many ticks of its way back, so many times in a row, rests where it is: another
-# robot rests too near, and each pushes the other away when it returns.
+# A robot that is displaced again within so many ticks of its way back, so many times in a row, rests: another one is too near.
 RECOVERY_TICKS: Final = 100
 RECOVERIES_MAX: Final = 4
 # Ticks that a standing robot sees no robot before it drives back on its way: one may be on its way to it.
@@ -148,9 +147,10 @@ class Situation:
 
     @property
     def claims(self) -> int:
-        """Number of frontier claims of this robot; what a dead robot's body closes is frontier, too."""
+        """Number of frontier claims of this robot; also of what a dead body closes, and of a robot apart from all others."""
         local_map = self.local_map
-        return len(local_map.plans) + len(local_map.gaps) + len(local_map.wall_plans) + local_map.obstructed
+        apart = local_map.slot not in (0, NOWHERE) and not (local_map.redundant or local_map.mutual())
+        return len(local_map.plans) + len(local_map.gaps) + len(local_map.wall_plans) + local_map.obstructed + apart
 
     def dead_ahead(self, bearing_rad: float, within_rad: float) -> int | None:
         """Return the dead robot that is visible next to a bearing [rad] of this robot's frame, within an angle, or None."""
