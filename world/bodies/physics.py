@@ -214,7 +214,8 @@ class Physics:
 
     def _kept_inside(self, here: Floats, there: Floats) -> Floats:
         """Return the places (k, 2) [m] to which bodies moved in this tick; one that crossed a wall is put back."""
-        crossing = np.flatnonzero(self._walls.crossed(here, there))
+        moved = np.flatnonzero((here != there).any(axis=1))
+        crossing = moved[self._walls.crossed(here[moved], there[moved])]
         if not len(crossing):
             return there
         self._shoving = _SHOVING_TICKS
