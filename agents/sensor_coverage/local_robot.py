@@ -12,6 +12,7 @@ from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.agents.sensor_coverage.messages.pushes import (
     AllSettled,
     AllStanding,
+    Body,
     Chain,
     LeaderReady,
     PushAborted,
@@ -58,7 +59,7 @@ class PushParticipant(Component):
         self._situation = situation
         self._map = situation.local_map
         self._beaconing = beaconing
-        self._over: dict[int, None] = {}
+        self._over: dict[int, Body | None] = {}  # pushes that are over for this robot, and how they ended
         situation.on_cleared = self._cleared
         situation.on_arrived = self._arrived
 
@@ -78,6 +79,8 @@ class PushParticipant(Component):
                 self.push.receive(message)
             case TakeSlot() if self._situation.free and self._has_me(message.chain):
                 self._join(message.push, NOWHERE, message.chain, None).receive(message)
+            case AllSettled() if (end := self._over.get(message.push)) is not None:
+                self._situation.mailbox.write(sender, end)  # the sender was out of sight when the push ended
             case _:
                 pass
         return True
@@ -124,6 +127,7 @@ class PushParticipant(Component):
         """Take part in a push."""
         self.push = TokenPush(self._situation, self._announce_vacated, push, fresh, chain, back, first)
         self.push.walls = self.walls
+        self.push.relays = self.pool is not None
         self._situation.in_push = True
         return self.push
 
@@ -163,9 +167,9 @@ class PushParticipant(Component):
         return None if self.push is None else self.push.next_wake()
 
     def _leave(self, push: TokenPush) -> None:
-        self._over[push.id] = None
+        self._over[push.id] = push.end
         if self.pool is not None:
-            self.pool.push_over(push.id, push.end)
+            self.pool.push_over(push.id, push.end, push.is_untold)
         self.push, self._situation.in_push = None, False
 
     def _cleared(self) -> None:

@@ -154,6 +154,9 @@ class FrontierService(Protocol):
     def plans(self) -> Iterable[Sequence[Plan]]:
         """Yield groups of possible deployments by falling priority; use a group only if no earlier one has a path."""
 
+    def next_plan(self, failed: Plan) -> Plan | None:
+        """Return the plan to carry out at once after one of this slot that a wall stopped, by the latest scan, or None."""
+
     def boundary_edges(self) -> tuple[Edge, ...]:
         """Return edges that contain a closed chain around all uncovered space."""
 

@@ -6,6 +6,7 @@ and side. The planner moves no robot.
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import islice
 from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.attempt_log import AttemptLog
@@ -37,6 +38,10 @@ BLOCKED_RAD: Final = math.radians(20.0)
 # no robot between it and the lattice.
 WHOLE_HOP: Final = 0.98
 
+# A scan, the edges to consider, and the open arcs, as `Planner.update` takes them.
+_Update = tuple[ScanResult, Iterable[Edge] | None, Mapping[int, Sequence[Arc]] | None]
+_NOTHING: Final = ScanResult({}, FlagComplex({}), ())
+
 
 class Planner:
     """The frontier service by the rules of the paper, on the memory in `slots`."""
@@ -52,7 +57,8 @@ class Planner:
         self._slots = slots
         self._follows_walls = parameters.walls == "followed"
         self._open: Mapping[int, Sequence[Arc]] | None = None  # the open arcs of all slots, once walls were followed
-        self._views, self._complex, self._bases = ScanResult({}, FlagComplex({}), ())
+        self._latest: _Update = (_NOTHING, None, None)  # what the latest plans were made of
+        self._views, self._complex, self._bases = _NOTHING
         self._plans: list[Plan] = []
 
     def update(
@@ -65,6 +71,7 @@ class Planner:
 
         `open_arcs` has those of the slots that are known without a coordinator, once walls were followed there.
         """
+        self._latest = scan, edges, open_arcs
         self._views, self._complex, self._bases = scan
         knows_all = self._follows_walls and edges is None
         self._open = self.walls.open_arcs(scan) if knows_all and self._slots.walks else open_arcs
@@ -94,6 +101,16 @@ class Planner:
             along_walls = list(self.walls.plans(ScanResult(self._views, self._complex, self._bases)))
             self.frontier = self.frontier or tuple(sorted({edge(*each.key[:2]) for each in along_walls}))
             yield along_walls
+
+    def next_plan(self, failed: Plan) -> Plan | None:
+        """Return the plan to carry out at once after one of this slot that a wall stopped, by the latest scan, or None.
+
+        It leads into the same gap, or beside the same edge: for another edge, a neighbour may have a better plan.
+        """
+        self.update(*self._latest)
+        edges, gaps = islice(self.plans(), 2)
+        same = [each for each in (edges if failed.key[2] else gaps) if each.key[:2] == failed.key[:2]]
+        return min(same, key=lambda each: each.key, default=None)
 
     def note_attempt(self, plan: Plan) -> None:
         """Record that a plan is tried."""

@@ -118,7 +118,8 @@ class PushToken(_PushMessage, frozen=True, tag="token"):
 class LeaderReady(_PushMessage, frozen=True, tag="ready"):
     """The leader to its follower: this will be your slot once I am gone. The leader stands there since drive `epoch`.
 
-    `walk`: the leader follows a wall once the others stand.
+    `walk`: the leader follows a wall once the others stand. If a wall stops the leader, it is back `back_ticks` after it got
+    out of sight; 0: it does not know when.
     """
 
     push: int
@@ -126,6 +127,7 @@ class LeaderReady(_PushMessage, frozen=True, tag="ready"):
     memory: SlotMemory
     epoch: int
     walk: bool = False
+    back_ticks: int = 0
 
 
 class TakeSlot(_PushMessage, frozen=True, tag="take-slot"):

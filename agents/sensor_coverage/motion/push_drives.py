@@ -23,6 +23,9 @@ AHEAD_RAD: Final = math.pi / 3.0
 # A deployment is stuck after this many ticks with less than this fraction of a full step forward.
 STUCK_TICKS: Final = 5
 STUCK_FRACTION: Final = 0.2
+# A bounded deployment gives up this many ticks after it would be clear at full speed; the way back takes up to this many more
+# than at full speed.
+LATE_TICKS: Final = 8
 # A deployment ends this close [m] to its full length.
 HOP_TOLERANCE_M: Final = 1e-3
 # A move with noisy bearings stops this close [m] to the goal and averages.
@@ -69,29 +72,41 @@ class DriveResult(NamedTuple):
 DriveToResult = Generator[BodyVelocity, None, DriveResult]
 
 
+def back_ticks(motion: Locomotion, clear_m: float) -> int:
+    """Return the ticks after which a bounded deployment that was stopped before it was clear is back at its start."""
+    return 2 * (math.ceil(clear_m / motion.step_m) + LATE_TICKS)
+
+
 def deploy(
-    motion: Locomotion, bearing_rad: float, hop_m: float, clear_m: float, on_cleared: Callable[[], None]
+    motion: Locomotion,
+    bearing_rad: float,
+    hop_m: float,
+    clear_m: float,
+    on_cleared: Callable[[], None],
+    bounded: bool = False,
 ) -> DriveToResult:
     """Drive into unknown space. Algorithm 1, line 8, with the test drive of section III-A, item iv.
 
     The robot may lose all visual links on its way: its follower drives to its start, and the link is restored then.
-    `on_cleared` is called once the robot has driven `clear_m`.
+    `on_cleared` is called once the robot has driven `clear_m`. A `bounded` one that a wall stops is back in `back_ticks`.
     """
     frame = motion.frame
     frame.forget()
     start = motion.position
     ux, uy = unit(bearing_rad)
     cleared, stuck = False, 0
+    out_ticks = back_ticks(motion, clear_m) // 2 if bounded else motion.parameters.drive_ticks_max
     touched: tuple[float, ...] = ()
     done = 0.0
-    for _ in range(motion.parameters.drive_ticks_max):
+    for ticks in range(motion.parameters.drive_ticks_max):
         now = (frame.x_m - start[0]) * ux + (frame.y_m - start[1]) * uy
         stuck = stuck + 1 if now < done + STUCK_FRACTION * motion.step_m else 0
         done = max(done, now)
         ahead = [each for each in frame.touched if angle_between(each, bearing_rad) < AHEAD_RAD]
-        if ahead or stuck > STUCK_TICKS:
+        robots = tuple(each for each in frame.contacts if each.node is not None)
+        late = ticks >= out_ticks and done < clear_m and not robots  # a body that it pushes slows it down
+        if ahead or stuck > STUCK_TICKS or late:
             touched = tuple(ahead)
-            robots = tuple(each for each in frame.contacts if each.node is not None)
             if done < clear_m:
                 yield from motion.drive_to(start)
                 return DriveResult(False, driven_m=done, touched=touched, robots=robots)
@@ -281,14 +296,16 @@ def correct(motion: Locomotion, anchors: Sequence[Sighting]) -> DriveToResult:
     return DriveResult(True)
 
 
-def regain(motion: Locomotion, node: int, goal: Vector) -> DriveToResult:
+def regain(motion: Locomotion, node: int, goal: Vector, bearing_rad: float | None = None) -> DriveToResult:
     """Drive by odometry to where a robot was in sight, until it is, and `margin_m` further; else drive back.
+
+    The last `PAST_M` of the way lead on past the goal, or along `bearing_rad`.
 
     A wall, or noise, may have stopped a move a little before its goal. Beside a door that hides the room behind it.
     """
     p, frame, start = motion.parameters, motion.frame, motion.position
     x, y = _offset(motion, goal)
-    ux, uy = unit(math.atan2(y, x))
+    ux, uy = unit(math.atan2(y, x) if bearing_rad is None else bearing_rad)
     way_m, seen_m = math.hypot(x, y) + PAST_M, math.inf
     for step in range(math.ceil(way_m / p.creep_m)):
         driven_m = step * p.creep_m

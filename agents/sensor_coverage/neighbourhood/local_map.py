@@ -316,10 +316,11 @@ class LocalMap(NeighbourTable):
         """Return a plan for each open arc here that no robot has probed yet, for this robot to carry out."""
         return self._planner.walls.probes_at(self.slot, self.proof.open_arcs())
 
-    def note_failure(self, plan: Plan, driven_m: float) -> None:
-        """Record that a wall stopped a plan after `driven_m`."""
+    def note_failure(self, plan: Plan, driven_m: float) -> Plan | None:
+        """Record that a wall stopped a plan after `driven_m`; return the plan to carry out at once."""
         self._planner.note_failure(plan, driven_m)
         self.replan()
+        return self._planner.next_plan(plan)
 
     def note_near(self, near: Iterable[tuple[float, float]]) -> None:
         """Record arcs (start, width) [rad] around this slot in which a wall close to it was followed."""

@@ -302,10 +302,10 @@ class Situation:
         else:
             self._activity = self._recover(self.motion.rest)
 
-    def deploy(self, bearing_rad: float, hop_m: float, clear_m: float) -> None:
+    def deploy(self, bearing_rad: float, hop_m: float, clear_m: float, bounded: bool = False) -> None:
         """Begin to drive into unknown space."""
         self._start = self.motion.position
-        self._drive(deploy(self.motion, bearing_rad, hop_m, clear_m, lambda: self.on_cleared()))
+        self._drive(deploy(self.motion, bearing_rad, hop_m, clear_m, lambda: self.on_cleared(), bounded))
 
     def move(self, bearing_rad: float, hop_m: float, landmarks: Sequence[Landmark], knows_way: bool = True) -> None:
         """Begin to drive to the slot ahead, by landmarks alone if the way there is unknown."""
@@ -315,9 +315,9 @@ class Situation:
             self._goal = x + hop_m * ux, y + hop_m * uy
         self._drive(move(self.motion, bearing_rad, hop_m, landmarks, knows_way))
 
-    def regain(self, node: int) -> None:
-        """Begin to look for a robot that was in sight from the slot to which this robot has moved."""
-        self._drive(regain(self.motion, node, self._goal))
+    def regain(self, node: int, bearing_rad: float | None = None) -> None:
+        """Begin to look for a robot that was in sight from the slot to which this robot has moved, or along a bearing [rad]."""
+        self._drive(regain(self.motion, node, self._goal if bearing_rad is None else self.motion.position, bearing_rad))
 
     def correct(self, anchors: Sequence[Sighting]) -> None:
         """Begin to correct the scale."""

@@ -87,7 +87,9 @@ class PushPart:
         self.id = push
         self.phase = "link"
         self.over = False
+        self.relays = False  # whether the end of the push can go to the base by way of other robots
         self.end: Body | None = None
+        self.is_untold = False  # the base is out of sight, and needs the end
         self.next: int | None = None
         self._situation: PushSituation = situation
         self._map: NeighbourTable = situation.local_map
@@ -99,12 +101,17 @@ class PushPart:
         self._memory: SlotMemory | None = None
         self._ahead_rad: float | None = None  # the bearing of the robot ahead at its slot
         self._plan: Plan | None = None
+        self._led_at = situation.tick
+        self._behind_rad: float | None = None  # the bearing of the follower at this robot's slot
+        self._bounded = False  # whether the leader knows when it is back
         self._first_bearings = list(FIRST_BEARINGS_RAD) if first else []
         self._vacated = False
         self._ahead_stands = self._behind_settled = False
         self._result = DriveResult(True)
         self._anchors: tuple[Sighting, ...] = ()
         self._leader_epoch = -1
+        self._back_ticks = 0  # bound of the ticks for which a leader that a wall stops is out of sight, 0 if not known
+        self._leader_seen_at = 0
         self._walks = self._walk_over = False  # whether the leader follows a wall, and has ended
         self._lost: dict[int, None] = {}  # robots that have restarted since this robot takes part
 
@@ -141,6 +148,12 @@ class PushPart:
         back_rad = direction_to(memory, self._chain.origin)
         seen_rad = self._situation.bearings[leader] + self._heading
         return back_rad is not None and angle_between(back_rad + math.pi, seen_rad) > BACK_RAD
+
+    def _leader_stays_away(self) -> bool:
+        """Return whether the leader has been out of sight for so long that no wall has stopped it."""
+        if self._chain.leader[1] in self._situation.bearings:
+            self._leader_seen_at = self._situation.tick
+        return 0 < self._back_ticks < self._situation.tick - self._leader_seen_at
 
     def _has_lost_behind(self) -> bool:
         """Return whether this robot does not see the robot behind, which is not known to be dead or without memory."""
@@ -187,6 +200,8 @@ class PushPart:
         return max(self._situation.tick + 1, self._since + ticks + 1)
 
     def _next_vacancy_check(self) -> int:
+        if self._back_ticks:
+            return self._next_tick()
         checks = self._waited // VACANCY_PERIOD_TICKS + 1
         return self._since + max(VACATED_TICKS + 1, checks * VACANCY_PERIOD_TICKS + 1)
 
@@ -222,4 +237,5 @@ class PushPart:
         return (self._situation.clear and informed) or self._waited > CLOSE_TICKS
 
     def _out_of_range(self) -> bool:
-        return not self._chain.is_rear and self._waited > TELL_TICKS and self._back not in self._situation.bearings
+        tells = self.relays or not self._chain.is_rear
+        return tells and self._waited > TELL_TICKS and self._back not in self._situation.bearings

@@ -2,7 +2,7 @@
 
     offer   redundant robot to base, hop by hop, each to the neighbour that is nearest to the base
     call    base to redundant robot: through the slots of the offer's path, with the robots that occupy them now end
-    rear of the push to base: the outcome
+    rear of the push to base: the outcome; also of a push from the base, if its rear does not see the base
 
 Each hop is a reliable message, and a robot that forwards one keeps nothing. The base has one push at a time, its own or
 one that it called for, and gives the new slot its number. So no slot has two numbers, and no number two slots. An offer
@@ -69,14 +69,17 @@ class RedundantPool(Component):
             case _:
                 pass
 
-    def push_over(self, push: int, end: Body | None) -> None:
-        """Report the outcome of a push, if this robot was called for it."""
-        if push != self._called:
+    def push_over(self, push: int, end: Body | None, untold: bool) -> None:
+        """Report the outcome of a push, if this robot was called for it, or is its rear and does not see the base."""
+        called = push == self._called
+        if not (called or untold):
             return
-        self._called = None
         done = isinstance(end, PushDone)
         tried = done or (isinstance(end, PushAborted) and end.tried)
         self._pending.append(RedundantPushEnd(push, tried, done))
+        if not called:
+            return
+        self._called = None
         if tried:
             self._offer_at = self._situation.tick + FIRST_OFFER_TICKS
 

@@ -38,16 +38,16 @@ from zwerm.agents.sensor_coverage.messages.pushes import (
     TakeSlot,
 )
 from zwerm.agents.sensor_coverage.motion.push_drives import DriveResult
-from zwerm.agents.sensor_coverage.motion.push_geometry import FIRST_BEARINGS_RAD, direction_to
-from zwerm.agents.sensor_coverage.motion.triangulation import distances_m
-from zwerm.agents.sensor_coverage.motion.walls.wall_walk import CLEAR_M, WalkResult
+from zwerm.agents.sensor_coverage.motion.push_geometry import direction_to
+from zwerm.agents.sensor_coverage.motion.walls.wall_walk import WalkResult
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
 from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
+from zwerm.agents.sensor_coverage.protocols.lead_push import LeadPush
 from zwerm.agents.sensor_coverage.protocols.push_part import ARMED_TICKS, LINK_TICKS, LOST_TICKS, WAVE_TICKS, PushPart
 from zwerm.agents.sensor_coverage.protocols.walls.wall_push import WallPush
 
 
-class TokenPush(PushPart, WallPush):
+class TokenPush(PushPart, LeadPush, WallPush):
     """One robot's part in one push: what it does on messages, at the end of drives, and at the end of a wait."""
 
     _situation: Situation
@@ -58,10 +58,8 @@ class TokenPush(PushPart, WallPush):
     def receive(self, body: PushMessage) -> None:
         """Take in a message of this push."""
         match body:
-            case LeaderReady():
-                self._take_memory(body)
-                self._leader_epoch = body.epoch
-                self._enter("armed")
+            case LeaderReady() if self.phase in ("link", "armed"):
+                self._arm(body)
             case TakeSlot():
                 self._take_memory(body)
                 self._call()
@@ -74,6 +72,8 @@ class TokenPush(PushPart, WallPush):
                 self._behind_settled = True
             case PushDone():
                 self.close(body)
+            case _:
+                pass  # the leader tries another direction, and this robot is on its way: it was too late
 
     def leader_vacated(self) -> None:
         """Take in that the leader has left its slot."""
@@ -126,6 +126,7 @@ class TokenPush(PushPart, WallPush):
 
     def lead(self) -> None:
         """Be the leader, once this robot's view agrees with its neighbours' states."""
+        self._led_at = self._situation.tick
         self._enter("holding")
 
     def _offer(self) -> None:
@@ -140,8 +141,7 @@ class TokenPush(PushPart, WallPush):
             self._enter("offering")
             if self._plan.walk:
                 self._map.note_attempt(self._plan)  # before the follower gets the slot's memory
-            ready = LeaderReady(self.id, self._chain.links, self._map.memory(), self._map.epoch, self._plan.walk)
-            self._situation.mailbox.write(behind, ready)
+            self._write_ready(behind, self._plan)
 
     def _deploy(self) -> None:
         if self._plan is not None and self._plan.walk:
@@ -157,65 +157,16 @@ class TokenPush(PushPart, WallPush):
         elif self._plan is not None:
             self._map.note_attempt(self._plan)
             bearing_rad = wrapped(self._plan.direction - self._heading)
-            self._situation.deploy(
-                bearing_rad, self._plan.hop_m, self._situation.clear_m(bearing_rad, self._plan.clear_m)
-            )
-
-    def _deployed(self, result: DriveResult) -> None:
-        if not result.ok:
-            self._blocked(result)
-            return
-        self._anchors = self._find_anchors()
-        self._map.occupy(self._fresh)
-        if self._first_bearings:
-            self._map.heading = 0.0
-            self._correct()
-            return
-        self._enter("out")
-        self._write(AllStanding(self.id))
-
-    def _blocked(self, result: DriveResult) -> None:
-        """End the push after a test drive that met a wall; the first robot tries its other bearings before."""
-        if self._plan is not None:
-            body = self._situation.body_in_the_way(result, wrapped(self._plan.direction - self._heading))
-            if body is None:
-                self._map.note_failure(self._plan, result.driven_m)
-            else:
-                self._map.note_obstruction(self._plan, result.driven_m, body)
-        elif len(self._first_bearings) > 1:
-            del self._first_bearings[0]
-            self._deploy()
-            return
-        elif self._first_bearings and self._map.parameters.walls == "followed" and self._back is not None:
-            self._enter("leaving")
-            self._situation.leave_station(self._back, FIRST_BEARINGS_RAD)
-            return
-        self._situation.stand()
-        self.close(PushAborted(self.id, True))
-
-    def _left_station(self, result: WalkResult) -> None:
-        """Stand at the new slot where the first robot got away from the base along a wall, or end the push."""
-        if result.driven_m > CLEAR_M:
-            self._map.occupy(self._fresh)
-            self._map.heading = 0.0
-            self._map.note_distances(distances_m(result.waypoints))
-            self._settled()
-        else:
-            self._situation.stand()
-            self.close(PushAborted(self.id, True))
-
-    def _find_anchors(self) -> tuple[Sighting, ...]:
-        """Return the robots that determine the leader's distance, with their approximate bearings."""
-        if self._first_bearings:
-            return (Sighting(self._back or 0, wrapped(self._first_bearings[0] + math.pi)),)
-        if self._plan is None:
-            return ()
-        back_rad = wrapped(self._plan.aim + math.pi - self._heading)
-        future = self._chain.future()
-        nodes = [future.get(slot, self._map.at(slot)) for slot in self._plan.anchors]
-        return tuple(Sighting(node, back_rad) for node in nodes if node is not None)
+            self._situation.deploy(bearing_rad, self._plan.hop_m, self._clear_m(self._plan), self._bounded)
 
     # --- the followers ------------------------------------------------------------------------------------------------
+
+    def _arm(self, body: LeaderReady) -> None:
+        """Wait until the leader has left its slot."""
+        self._take_memory(body)
+        self._leader_epoch, self._leader_seen_at = body.epoch, self._situation.tick
+        self._back_ticks = body.back_ticks if self._chain.leader[1] in self._situation.bearings else 0
+        self._enter("armed")
 
     def _call(self) -> None:
         """Inform the follower, and drive once it has acknowledged."""
@@ -344,8 +295,9 @@ class TokenPush(PushPart, WallPush):
             self._situation.mailbox.write(self._back, body)
 
     def _drop(self) -> None:
-        """End without a message: the robot behind is out of range, and its waiting time ends."""
+        """End without a message: the robot behind is out of range, and its waiting time ends. The base needs the end."""
         self._situation.mailbox.drop(self.id)
+        self.is_untold = self._chain.is_rear
         self.over = True
 
 
@@ -371,6 +323,7 @@ PHASES: Final[Mapping[str, Phase]] = {
     "probing": Phase(arrived=TokenPush._probed),
     "offering": Phase(),
     "deploying": Phase(arrived=TokenPush._deployed),
+    "rejoining": Phase(arrived=lambda push, _: push._give_up()),
     "leaving": Phase(arrived=TokenPush._left_station),
     "approaching": Phase(arrived=TokenPush._approached),
     "out": Phase(((TokenPush._settled_behind, TokenPush._go_on),), wake=TokenPush._wake_for_behind),
@@ -379,6 +332,7 @@ PHASES: Final[Mapping[str, Phase]] = {
     # Follower of the leader: wait until the leader's slot is vacant.
     "armed": Phase(((lambda push: push._leader_is_back() or push._waited > ARMED_TICKS,
                      lambda push: push.close(PushAborted(push.id, True))),
+                    (TokenPush._leader_stays_away, TokenPush._call),
                     (lambda push: push._vacancy_check_due() and push._leader_is_gone(), TokenPush._call)),
                    wake=TokenPush._next_vacancy_check),
     # Followers: let the next one come, drive, and wait until all ahead stand and all behind have settled.
