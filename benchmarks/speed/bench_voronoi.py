@@ -17,7 +17,7 @@ from zwerm.scenario.load import load
 from zwerm.scenario.tables import Scenario
 from zwerm.wire.messages import decode_observation
 
-TARGET = 20.0
+TARGET = 30.0
 
 
 def emulator(scenario: Scenario, seed: int) -> tuple[float, float]:

@@ -11,7 +11,7 @@
 
 Messages are repeated until they are acknowledged. A robot that waits too long continues alone. That may leave a hole,
 which becomes frontier again. If a leader is back and its follower has come all the same, they occupy the old and the
-new slot.
+new slot. A leader that a wall stopped may be `ready` again, for another direction.
 
 `PHASES` is the state machine: for each phase, its end conditions, the action at the end of a drive, and the time of the
 next wake-up.
