@@ -103,10 +103,12 @@ def deploy(
         stuck = stuck + 1 if now < done + STUCK_FRACTION * motion.step_m else 0
         done = max(done, now)
         ahead = [each for each in frame.touched if angle_between(each, bearing_rad) < AHEAD_RAD]
-        robots = tuple(each for each in frame.contacts if each.node is not None)
-        late = ticks >= out_ticks and done < clear_m and not robots  # a body that it pushes slows it down
+        late = ticks >= out_ticks and done < clear_m
+        if late:  # a body that it pushes slows it down
+            late = all(each.node is None for each in frame.contacts)
         if ahead or stuck > STUCK_TICKS or late:
             touched = tuple(ahead)
+            robots = tuple(each for each in frame.contacts if each.node is not None)
             if done < clear_m:
                 yield from motion.drive_to(start)
                 return DriveResult(False, driven_m=done, touched=touched, robots=robots)
@@ -300,7 +302,6 @@ def regain(motion: Locomotion, node: int, goal: Vector, bearing_rad: float | Non
     """Drive by odometry to where a robot was in sight, until it is, and `margin_m` further; else drive back.
 
     The last `PAST_M` of the way lead on past the goal, or along `bearing_rad`.
-
     A wall, or noise, may have stopped a move a little before its goal. Beside a door that hides the room behind it.
     """
     p, frame, start = motion.parameters, motion.frame, motion.position

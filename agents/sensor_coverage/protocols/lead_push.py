@@ -154,6 +154,7 @@ class LeadPush:
             self._give_up()
 
     def _give_up(self) -> None:
+        """Stand at the slot, and end the push."""
         self._situation.stand()
         self.close(PushAborted(self.id, True))
 
@@ -177,8 +178,7 @@ class LeadPush:
             self._map.note_distances(distances_m(result.waypoints))
             self._settled()
         else:
-            self._situation.stand()
-            self.close(PushAborted(self.id, True))
+            self._give_up()
 
     def _find_anchors(self) -> tuple[Sighting, ...]:
         """Return the robots that determine the leader's distance, with their approximate bearings."""
