@@ -22,6 +22,11 @@ class PushChain:
         return self.index == 0
 
     @property
+    def is_even(self) -> bool:
+        """True for every second robot of the chain, the rear among them."""
+        return self.index % 2 == 0
+
+    @property
     def leads(self) -> bool:
         """True if this robot is the first of the chain."""
         return self.index == len(self.links) - 1

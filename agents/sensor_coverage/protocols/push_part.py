@@ -32,8 +32,8 @@ TELL_TICKS: Final = 4
 WALK_TICKS: Final = 1200
 # After VACATED_TICKS a follower checks this often [ticks] whether the leader's slot is vacant.
 VACANCY_PERIOD_TICKS: Final = 20
-# With noisy bearings a robot homes again after every so many moves by odometry. Homing takes 5 s, and the robots of a single
-# file do it one after the other; odometry is off by a small fraction of a hop.
+# With noisy bearings a robot homes again after so many moves by odometry, or if its place in the chain is even: that takes 5 s,
+# and odometry is off by a small fraction of a hop. Where all moves begin at the base, it is even every second time.
 HOMED_EVERY: Final = 2
 # A leader that is visible within this angle [rad] of its slot's direction is still there, or back.
 BACK_RAD: Final = 0.3
@@ -178,7 +178,29 @@ class PushPart:
 
     def _homes_again(self, noisy: bool) -> bool:
         """Return whether to home again, now that all landmarks stand; `noisy`: it takes long."""
-        return self._result.used_moving_landmarks and (not noisy or self._map.odometry_moves % HOMED_EVERY == 0)
+        due = not noisy or self._chain.is_even or self._map.odometry_moves >= HOMED_EVERY
+        return self._result.used_moving_landmarks and due
+
+    def _stays(self) -> bool:
+        """Return whether this robot does not drive any more, if it sees its neighbours in the chain."""
+        return not self._result.used_odometry and not self._is_measured and not self._homes_again(noisy=True)
+
+    def _homes_early(self, noisy: bool) -> bool:
+        """Return whether to home again before all robots behind have: the one behind stands at this robot's former slot.
+
+        So every second robot of a chain homes at the same time, and those between them stand.
+        """
+        behind = None if self._back is None else self._map.states.get(self._back)
+        stands = behind is not None and not behind.moving and behind.slot == self._chain.origin
+        early = noisy and self._chain.is_even and not self._chain.is_rear
+        return (
+            early and stands and not self._result.used_odometry and not self._is_measured and self._homes_again(noisy)
+        )
+
+    @property
+    def _is_measured(self) -> bool:
+        """True if a walk has measured the distance to this robot's former slot."""
+        return self._chain.origin in self._map.distances_m
 
     def _vacancy_check_due(self) -> bool:
         return self._waited > VACATED_TICKS and self._waited % VACANCY_PERIOD_TICKS == 1

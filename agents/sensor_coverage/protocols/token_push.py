@@ -6,7 +6,7 @@
     vacated   the leader is far enough away; neighbours forward it, because the follower is out of range
     take      front to rear, each to its follower: the memory of the slot it leaves; each drives once that is acknowledged
     standing  front to rear: all robots ahead of you stand still
-    settled   rear to front: all robots behind you have reached their slots
+    settled   rear to front: all robots behind you have reached their slots; with noise every second one homed before that
     done      front to rear, and to the base
 
 Messages are repeated until they are acknowledged. A robot that waits too long continues alone. That may leave a hole,
@@ -43,7 +43,13 @@ from zwerm.agents.sensor_coverage.motion.walls.wall_walk import WalkResult
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
 from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
 from zwerm.agents.sensor_coverage.protocols.lead_push import LeadPush
-from zwerm.agents.sensor_coverage.protocols.push_part import ARMED_TICKS, LINK_TICKS, LOST_TICKS, WAVE_TICKS, PushPart
+from zwerm.agents.sensor_coverage.protocols.push_part import (
+    ARMED_TICKS,
+    LINK_TICKS,
+    LOST_TICKS,
+    WAVE_TICKS,
+    PushPart,
+)
 from zwerm.agents.sensor_coverage.protocols.walls.wall_push import WallPush
 
 
@@ -207,6 +213,8 @@ class TokenPush(PushPart, LeadPush, WallPush):
 
     def _report_standing(self) -> None:
         self._enter("standing")
+        if self._situation.motion.samples > 1 and self._stays():
+            self._situation.stand()  # others home on it
         if self._near:
             self._map.note_near(self._near)
         if self._chain.is_rear:
@@ -216,9 +224,8 @@ class TokenPush(PushPart, LeadPush, WallPush):
 
     def _straighten(self) -> None:
         """Correct the distance in a single file, where neither bearings nor a walk determined it, or that is too long."""
-        measured = self._chain.origin in self._map.distances_m
         if self._back is not None and (
-            self._behind_settled and self._has_lost_behind() if measured else self._result.used_odometry
+            self._behind_settled and self._has_lost_behind() if self._is_measured else self._result.used_odometry
         ):
             self._enter("straightening")
             self._situation.correct((Sighting(self._back, self._back_bearing_rad()),))
@@ -227,16 +234,32 @@ class TokenPush(PushPart, LeadPush, WallPush):
 
     def _home(self) -> None:
         """Repeat the visual homing on landmarks that were moving and stand still now."""
-        states = self._map.states
-        if self._memory is None or not self._homes_again(self._situation.motion.samples > 1):
+        if self._memory is not None and self._homes_again(self._situation.motion.samples > 1):
+            self._begin_homing()
+        else:
             self._regain()
+
+    def _home_early(self) -> None:
+        self._begin_homing()
+        self._enter("homing early")
+
+    def _begin_homing(self) -> None:
+        memory, states = self._memory, self._map.states
+        if memory is None:
             return
         self._enter("homing")
+        self._map.odometry_moves = 0
         future = self._chain.future()
         moving = {slot: node for slot, node in future.items() if node not in states or states[node].moving}
         still = {slot: node for slot, node in future.items() if slot not in moving}
-        references = [msgspec.structs.replace(r, node=still.get(r.slot, r.node)) for r in self._memory.references]
+        references = [msgspec.structs.replace(r, node=still.get(r.slot, r.node)) for r in memory.references]
         self._situation.move(0.0, 0.0, self._chain.landmarks(references, moving, self._heading, NOWHERE))
+
+    def _homed_early(self) -> None:
+        """Stand again, and wait until all robots behind have settled."""
+        self._result = DriveResult(True)
+        self._situation.stand()
+        self._enter("standing")
 
     def _regain(self) -> None:
         """Look for the robot ahead if it is out of sight: it drove from this slot to its own, so both see each other."""
@@ -340,7 +363,9 @@ PHASES: Final[Mapping[str, Phase]] = {
     "following": Phase(arrived=TokenPush._followed),
     "there": Phase(((lambda push: push._ahead_stands or push._waited_for_ahead(), TokenPush._report_standing),),
                    wake=TokenPush._wake_for_ahead),
-    "standing": Phase(((TokenPush._settled_behind, TokenPush._straighten),), wake=TokenPush._wake_for_behind),
+    "standing": Phase(((lambda push: push._homes_early(push._situation.motion.samples > 1), TokenPush._home_early),
+                       (TokenPush._settled_behind, TokenPush._straighten)), wake=TokenPush._wake_for_behind),
+    "homing early": Phase(arrived=lambda push, _: push._homed_early()),
     "straightening": Phase(arrived=lambda push, _: push._home()),
     "homing": Phase(arrived=lambda push, _: push._regain()),
     "regaining": Phase(arrived=lambda push, _: push._return()),
