@@ -15,8 +15,7 @@ class CheapestFirst:
     Each path has slots, and the slots that it uses as landmarks. Two pushes do not cross if no slot of one path is
     among those of the other. Then no robot takes a moving robot for a static landmark, and the new slots are far apart.
     A plan of lower priority is assigned only where no plan of higher priority is reachable in the same component of the
-    complex. A walk along a wall is assigned alone. It comes after the walks whose paths lead through its slot: the robot that
-    takes the slot then stands a little beside, and would have to follow walls close by anew.
+    complex. A walk along a wall is assigned alone.
     """
 
     def __init__(self, slots: Slots, pushes_max: int) -> None:
@@ -31,11 +30,10 @@ class CheapestFirst:
         if not routes.cost:
             return ()
         wanted = _wanted(plans, routes, scan.complex_)
-        passed = _passed(wanted, routes)
         left, chosen = scan.complex_, list[Plan]()
         while len(chosen) < self._pushes_max:
             reached = [
-                (plan.walk, plan.walk and plan.mover in passed, routes.cost[plan.mover], plan.mover, plan.key, plan)
+                (plan.walk, routes.cost[plan.mover], plan.mover, plan.key, plan)
                 for plan in wanted
                 if plan.mover in routes.cost
             ]
@@ -58,12 +56,6 @@ class CheapestFirst:
             found |= dict.fromkeys(scan.complex_.neighbours.get(slot, ()))
             found |= dict.fromkeys(other for other, _ in self._slots.known_from(slot))
         return found
-
-
-def _passed(plans: Iterable[Plan], routes: CheapestRoutes) -> Collection[int]:
-    """Return the slots before the last one of the paths of walks."""
-    movers = dict.fromkeys(plan.mover for plan in plans if plan.walk)
-    return dict.fromkeys(slot for mover in movers for slot in routes.path(mover)[:-1])
 
 
 def _wanted(plans: Iterable[Sequence[Plan]], routes: CheapestRoutes, complex_: FlagComplex) -> list[Plan]:

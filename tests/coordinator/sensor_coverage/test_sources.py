@@ -196,22 +196,6 @@ def test_two_pushes_from_one_station_never_go_at_once() -> None:
     assert assigned(star, {0: 0.0}, [plan(4), plan(8)]) == [(0, 1, 2, 3, 4)]
 
 
-def test_a_walk_comes_after_those_whose_paths_lead_through_its_slot() -> None:
-    """From the base two branches lead through slot 1: to 2, 3 and 4, and to 5."""
-    tree = FlagComplex({0: [1], 1: [0, 2, 5], 2: [1, 3], 3: [2, 4], 4: [3], 5: [1]})
-    walks = {mover: plan(mover)._replace(walk=True) for mover in (1, 2, 4, 5)}
-    left, order = dict(walks), []
-    while left:
-        path, *more = assigned(tree, {0: 0.0}, list(left.values()))
-        assert not more, "a walk is alone"
-        order.append(path[-1])
-        del left[path[-1]]
-    assert order == [5, 4, 2, 1]
-    assert assigned(tree, {0: 0.0}, [walks[1], plan(4)]) == [(0, 1, 2, 3, 4)], "a push comes before all walks"
-    pushes = [plan(1), plan(4)]
-    assert assigned(tree, {0: 0.0}, pushes) == [(0, 1)], "the order of pushes is that of their costs"
-
-
 def test_a_plan_of_low_priority_is_assigned_only_without_a_reachable_plan_of_high_priority() -> None:
     two = FlagComplex({0: [1], 1: [0, 2], 2: [1], 5: [6], 6: [5]})
     edges, gaps = [plan(2)], [plan(1), plan(6)]
