@@ -192,7 +192,7 @@ class PushPart:
         """
         behind = None if self._back is None else self._map.states.get(self._back)
         stands = behind is not None and not behind.moving and behind.slot == self._chain.origin
-        early = noisy and self._chain.is_even and not self._chain.is_rear
+        early = noisy and self._chain.is_even and not self._chain.is_rear and self._memory is not None
         return (
             early and stands and not self._result.used_odometry and not self._is_measured and self._homes_again(noisy)
         )

@@ -4,6 +4,7 @@ import msgspec
 import pytest
 
 from zwerm.agents.sensor_coverage.messages.beacons import NO_PATH_VECTOR, StateBeacon
+from zwerm.agents.sensor_coverage.messages.pushes import SlotMemory
 from zwerm.agents.sensor_coverage.motion.push_drives import DriveResult
 from zwerm.agents.sensor_coverage.neighbourhood.neighbour_table import NeighbourTable
 from zwerm.agents.sensor_coverage.protocols.push_part import PushPart
@@ -56,6 +57,8 @@ def test_every_second_robot_homes_before_those_behind_have_once_the_one_behind_s
         here.local_map.states[BEHIND] = msgspec.structs.replace(state, **behind)
         part = here.part(even)
         part._note_move(result)
+        assert not part._homes_early(noisy), "it does not know the slot yet"
+        part._memory = SlotMemory(4, (), (), (), (), (), ())
         return part._homes_early(noisy)
 
     assert homes()
