@@ -36,7 +36,7 @@ class NeighbourTable:
     still stands there. `reach` has the hops to the base. `epoch` counts its drives, and `samples` its averages
     of bearings. `heading` [rad] is in the base's frame, or None if unknown. `distances_m` has the distances [m] from its slot
     to others that are not a hop away, as a walk measured them. `odometry_moves` counts the robot's latest moves to slots, in
-    a row, at whose end too few landmarks stood. `version` counts all changes: between two
+    a row and since it homed again, at whose end too few landmarks stood. `version` counts all changes: between two
     changes, no decision changes.
     """
 

@@ -183,19 +183,23 @@ class PushPart:
 
     def _stays(self) -> bool:
         """Return whether this robot does not drive any more, if it sees its neighbours in the chain."""
-        return not self._result.used_odometry and not self._is_measured and not self._homes_again(noisy=True)
+        return self._is_straight and not self._homes_again(noisy=True)
 
     def _homes_early(self, noisy: bool) -> bool:
         """Return whether to home again before all robots behind have: the one behind stands at this robot's former slot.
 
         So every second robot of a chain homes at the same time, and those between them stand.
         """
-        behind = None if self._back is None else self._map.states.get(self._back)
+        if not noisy or not self._chain.is_even or self._chain.is_rear or self._back is None or self._memory is None:
+            return False
+        behind = self._map.states.get(self._back)
         stands = behind is not None and not behind.moving and behind.slot == self._chain.origin
-        early = noisy and self._chain.is_even and not self._chain.is_rear and self._memory is not None
-        return (
-            early and stands and not self._result.used_odometry and not self._is_measured and self._homes_again(noisy)
-        )
+        return stands and self._is_straight and self._homes_again(noisy)
+
+    @property
+    def _is_straight(self) -> bool:
+        """True if the distance to the robot behind needs no correction: bearings determined it, and no walk measured it."""
+        return not self._result.used_odometry and not self._is_measured
 
     @property
     def _is_measured(self) -> bool:

@@ -35,6 +35,7 @@ from zwerm.agents.sensor_coverage.messages.pushes import (
     PushDone,
     PushMessage,
     PushToken,
+    SlotMemory,
     TakeSlot,
 )
 from zwerm.agents.sensor_coverage.motion.push_drives import DriveResult
@@ -43,13 +44,7 @@ from zwerm.agents.sensor_coverage.motion.walls.wall_walk import WalkResult
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
 from zwerm.agents.sensor_coverage.neighbourhood.situation import Situation
 from zwerm.agents.sensor_coverage.protocols.lead_push import LeadPush
-from zwerm.agents.sensor_coverage.protocols.push_part import (
-    ARMED_TICKS,
-    LINK_TICKS,
-    LOST_TICKS,
-    WAVE_TICKS,
-    PushPart,
-)
+from zwerm.agents.sensor_coverage.protocols.push_part import ARMED_TICKS, LINK_TICKS, LOST_TICKS, WAVE_TICKS, PushPart
 from zwerm.agents.sensor_coverage.protocols.walls.wall_push import WallPush
 
 
@@ -58,6 +53,11 @@ class TokenPush(PushPart, LeadPush, WallPush):
 
     _situation: Situation
     _map: LocalMap
+
+    @property
+    def _is_noisy(self) -> bool:
+        """True if one reading of a bearing is not enough."""
+        return self._situation.motion.samples > 1
 
     # --- events -------------------------------------------------------------------------------------------------------
 
@@ -213,7 +213,7 @@ class TokenPush(PushPart, LeadPush, WallPush):
 
     def _report_standing(self) -> None:
         self._enter("standing")
-        if self._situation.motion.samples > 1 and self._stays():
+        if self._is_noisy and self._stays():
             self._situation.stand()  # others home on it
         if self._near:
             self._map.note_near(self._near)
@@ -234,20 +234,18 @@ class TokenPush(PushPart, LeadPush, WallPush):
 
     def _home(self) -> None:
         """Repeat the visual homing on landmarks that were moving and stand still now."""
-        if self._memory is not None and self._homes_again(self._situation.motion.samples > 1):
-            self._begin_homing()
+        if self._memory is not None and self._homes_again(self._is_noisy):
+            self._begin_homing("homing", self._memory)
         else:
             self._regain()
 
     def _home_early(self) -> None:
-        self._begin_homing()
-        self._enter("homing early")
+        if self._memory is not None:
+            self._begin_homing("homing early", self._memory)
 
-    def _begin_homing(self) -> None:
-        memory, states = self._memory, self._map.states
-        if memory is None:
-            return
-        self._enter("homing")
+    def _begin_homing(self, phase: str, memory: SlotMemory) -> None:
+        self._enter(phase)
+        states = self._map.states
         self._map.odometry_moves = 0
         future = self._chain.future()
         moving = {slot: node for slot, node in future.items() if node not in states or states[node].moving}
@@ -363,7 +361,7 @@ PHASES: Final[Mapping[str, Phase]] = {
     "following": Phase(arrived=TokenPush._followed),
     "there": Phase(((lambda push: push._ahead_stands or push._waited_for_ahead(), TokenPush._report_standing),),
                    wake=TokenPush._wake_for_ahead),
-    "standing": Phase(((lambda push: push._homes_early(push._situation.motion.samples > 1), TokenPush._home_early),
+    "standing": Phase(((lambda push: push._homes_early(push._is_noisy), TokenPush._home_early),
                        (TokenPush._settled_behind, TokenPush._straighten)), wake=TokenPush._wake_for_behind),
     "homing early": Phase(arrived=lambda push, _: push._homed_early()),
     "straightening": Phase(arrived=lambda push, _: push._home()),

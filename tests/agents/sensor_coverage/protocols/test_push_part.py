@@ -46,6 +46,9 @@ def test_with_noise_a_robot_homes_again_at_even_places_and_after_every_second_mo
     assert found == homes
     part._note_move(DriveResult(True))
     assert not part._homes_again(noisy)
+    part._note_move(DriveResult(True, used_odometry=True, used_moving_landmarks=True))
+    due = even or not noisy
+    assert part._homes_again(noisy) is due, "moves in between that landmarks determined begin anew"
 
 
 def test_every_second_robot_homes_before_those_behind_have_once_the_one_behind_stands() -> None:
