@@ -56,7 +56,8 @@ def passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
             before = point_before(slot, last.get(slot), now, touch.since, bool(between))
             there = stretch_of.get(since) if before is not None else None
             ends = () if here is None or there is None else (there.first, here.last)
-            pockets = tuple(pockets_beside(slot, number, point, stretches, first)) if slot in point.robots else ()
+            beside = pockets_beside(slot, number, walk.points, stretches) if slot in point.robots else ()
+            pockets = tuple((first + first_number, pocket) for first_number, pocket in beside)
             between = between if before is not None else ()
             edges = tuple(sight_ends_at(slot, number, others, walk.end))
             yield slot, Passed(first + number, before, point, walk.hand, between, number_of, ends, pockets, edges)

@@ -73,9 +73,11 @@ def crossings_of_pocket(hand: int, pocket: Pocket, other_is_loose: bool) -> Iter
     """Yield the directions of a slot that cross the line from a walking robot beside it to the wall that it touched.
 
     Where the slot looks into the strip there, some directions leave it at the other end of the stretch, if that is loose.
+    The line begins in the direction in which the first or last step does: with another one, of odometry, noise between the
+    two would count as wall.
     """
     place, end, other = pocket.place, pocket.end, pocket.other
-    there = direction_of(place, end.at)
+    there = direction_of(place, end.at) if pocket.end_rad is None else pocket.end_rad
     to_wall = math.remainder(direction_of(place, end.touched) - there, math.tau)
     step = to_wall if pocket.is_last else -to_wall
     arc = arc_between(there, there + to_wall)

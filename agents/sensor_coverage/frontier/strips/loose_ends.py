@@ -3,7 +3,8 @@
 A step of a walk closes the directions in which a slot sees it, because the wall is beyond. A slot that looks along the wall
 sees past the last step, between the walking robot and the point of the wall that it touched: there the wall may end, and an
 opening begin. So a direction counts only if its ray from the step does not leave the strip between the walk and the wall at
-an end of the stretch.
+an end of the stretch. Nor may it pass the end at the other side of the walking robot, within a radius of its body: then the
+step leads along the ray, and only the noise of bearings makes the ray seem to enter the strip.
 
 An end is tied where another robot is responsible for the space beyond: the walking robot touched a standing robot there, or
 stands there itself. It is loose when this robot is gone.
@@ -44,7 +45,8 @@ class Pocket(NamedTuple):
     """An end of a stretch beside a standing robot at a place [m], the other end, and a body's radius [m].
 
     `is_last` is true for the last point of the stretch. The walking robot touched the standing robot there if it is `in_touch`,
-    else a few points away, without a wall in touch. `before` is the last end of the stretch before.
+    else a few points away, without a wall in touch. `before` is the last end of the stretch before. `end_rad` is the direction
+    [rad] in which the standing robot saw the walking one at the end, if it did.
     """
 
     end: StretchEnd
@@ -54,6 +56,7 @@ class Pocket(NamedTuple):
     place: Vector
     in_touch: bool
     before: StretchEnd | None = None
+    end_rad: float | None = None
 
 
 class FollowedStretch(NamedTuple):
@@ -114,7 +117,9 @@ def kept_part(
     def leaks(part: float, stretch_end: StretchEnd) -> bool:
         part = min(max(part, INWARD), 1.0 - INWARD)
         at = start[0] + part * (end[0] - start[0]), start[1] + part * (end[1] - start[1])
-        return _crosses(at, there_rad + part * step_rad, stretch_end.at, stretch_end.touched)
+        (x, y), (wall_x, wall_y) = stretch_end.at, stretch_end.touched
+        beside = 2.0 * x - wall_x, 2.0 * y - wall_y
+        return _crosses(at, there_rad + part * step_rad, beside, stretch_end.touched)
 
     def edge_of(inside: float, outside: float, stretch_end: StretchEnd) -> float:
         for _ in range(HALVINGS):

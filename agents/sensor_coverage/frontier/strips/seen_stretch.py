@@ -197,10 +197,21 @@ class SeenStretch:
 
     def _pockets(self) -> Iterator[tuple[Pocket, tuple[int, ...]]]:
         """Yield the pockets at the ends, and the slots that saw them."""
+        ends_rad = self._ends_rad()
         for number, point, seen in self._touches:
-            pocket = pocket_of(self.stretch, number, point.at, point.seen[self._slot], self._before)
+            pocket = pocket_of(self.stretch, number, point.at, point.seen[self._slot], self._before, ends_rad)
             if pocket is not None:
                 yield pocket, seen
+
+    def _ends_rad(self) -> tuple[float | None, float | None]:
+        """Return the directions [rad] in which the slot saw the walking robot at the two ends, if it did."""
+        if not self._steps:
+            return None, None
+        first, last = self._steps[0].before, self._steps[-1].point
+        return (
+            first.seen[self._slot] if first.at == self.stretch.first.at else None,
+            last.seen[self._slot] if last.at == self.stretch.last.at else None,
+        )
 
     def _beside_pockets(self, contacts: Collection[float]) -> Iterator[KeyedArc]:
         """Yield the arcs beside pockets."""

@@ -2,7 +2,6 @@
 
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import pairwise
 
 from zwerm.agents.sensor_coverage.frontier.directions import angle_between
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import (
@@ -19,12 +18,18 @@ from zwerm.agents.sensor_coverage.motion.homing import unit
 
 
 def pocket_of(
-    stretch: FollowedStretch, number: int, at: Vector, there_rad: float, before: StretchEnd | None = None
+    stretch: FollowedStretch,
+    number: int,
+    at: Vector,
+    there_rad: float,
+    before: StretchEnd | None = None,
+    ends_rad: tuple[float | None, float | None] = (None, None),
 ) -> Pocket | None:
     """Return the pocket beside a robot that was touched at the point with this number, or None if that is no end of a way.
 
-    The walking robot was at the place `at` then. The touched robot sees it in a direction [rad]. There is no pocket if the
-    standing robot is between the end of the way and the wall: the walking robot passed it meanwhile.
+    The walking robot was at the place `at` then. The touched robot sees it in a direction [rad], and saw it at the first and
+    the last point of the stretch in the directions `ends_rad` [rad], if it did. There is no pocket if the standing robot is
+    between the end of the way and the wall: the walking robot passed it meanwhile.
     """
     if stretch.first_number == stretch.last_number:
         return None  # the way of a single point leads nowhere
@@ -38,22 +43,24 @@ def pocket_of(
     if angle_between(direction_of(place, end.at), direction_of(place, end.touched)) > POCKET_RAD:
         return None
     if is_last:
-        return Pocket(stretch.last, stretch.first, stretch.radius_m, True, place, in_touch)
-    return Pocket(stretch.first, stretch.last, stretch.radius_m, False, place, in_touch, before)
+        return Pocket(stretch.last, stretch.first, stretch.radius_m, True, place, in_touch, end_rad=ends_rad[1])
+    return Pocket(stretch.first, stretch.last, stretch.radius_m, False, place, in_touch, before, ends_rad[0])
 
 
 def pockets_beside(
-    slot: int, number: int, point: WalkPoint, stretches: Sequence[FollowedStretch], first: int
+    slot: int, number: int, points: Sequence[WalkPoint], stretches: Sequence[FollowedStretch]
 ) -> Iterator[tuple[int, Pocket]]:
-    """Yield the pockets beside a slot whose robot the walking robot touches at a point, by the numbers of their stretches.
+    """Yield the pockets beside a slot whose robot the walking robot touches at a point, by the first points of their stretches.
 
-    The point has this number in its walk, whose first point has the number `first`.
+    The point has this number in its walk.
     """
-    for before, each in pairwise((None, *stretches)):
-        end = None if before is None else before.last
-        pocket = None if each is None else pocket_of(each, number, point.at, point.seen[slot], end)
-        if each is not None and pocket is not None:
-            yield first + each.first_number, pocket
+    point, before = points[number], None
+    for each in stretches:
+        ends_rad = points[each.first_number].seen.get(slot), points[each.last_number].seen.get(slot)
+        pocket = pocket_of(each, number, point.at, point.seen[slot], before, ends_rad)
+        if pocket is not None:
+            yield each.first_number, pocket
+        before = each.last
 
 
 class StretchTracker:

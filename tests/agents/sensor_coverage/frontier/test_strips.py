@@ -195,3 +195,32 @@ def test_an_end_within_the_directions_of_a_step_is_cut_out() -> None:
         assert not math.atan2(0.215, -0.215) + 0.017 < direction < math.atan2(0.154, -0.25), "past the end of the strip"
     assert 0.0 < high - low < 1.0
     assert kept_part(start, stop, there, beyond - there, []) == (0.0, 1.0)
+
+
+def test_a_last_step_away_from_the_slot_closes_nothing_by_the_noise_of_its_bearings() -> None:
+    """The step leads to the north along a wall in the east. By noise the slot sees it turn left, as if the wall was beyond."""
+    end = StretchEnd((0.0, 1.0), (RADIUS_M, 1.0))
+    start, stop = math.radians(91.0), math.radians(96.0)
+    assert kept_part((0.0, 0.9), end.at, start, stop - start, []) == (0.0, 1.0)
+    assert kept_part((0.0, 0.9), end.at, start, stop - start, [end]) == (0.0, 0.0)
+    assert kept_part((0.0, 0.9), end.at, math.radians(-20.0), stop - start, [end]) == (0.0, 1.0), (
+        "a slot before the wall"
+    )
+
+
+def test_noise_of_the_first_bearing_beside_a_robot_closes_nothing_past_the_way() -> None:
+    """A walk away from the robot at the slot. By odometry it begins 6 degrees to the left of where the slot saw it."""
+    wall = (math.radians(-60.0),)
+    points = (
+        WalkPoint({0: math.radians(76.0)}, (), (0,), at=(2.531, -0.569)),
+        WalkPoint({0: math.radians(53.0)}, wall, (), at=(2.579, -0.581)),
+        WalkPoint({0: math.radians(55.0)}, wall, (), at=(2.627, -0.512)),
+        WalkPoint({0: math.radians(57.0)}, wall, (), at=(2.656, -0.484)),
+        WalkPoint({0: math.radians(54.0)}, wall, (), at=(2.746, -0.398)),
+        WalkPoint({0: math.radians(46.0)}, wall, (), at=(2.794, -0.344)),
+        WalkPoint({0: math.radians(47.0)}, wall, (), at=(2.822, -0.338)),
+    )
+    arcs = [arc for each in proof_of(Walk(0, -1, points, RADIUS_M), (0,))._by_stretch[0].values() for arc in each]
+    closed = {each for each in range(25, 75) if any((math.radians(each) - a) % math.tau < width for a, width in arcs)}
+    assert closed, "the wall beside the way"
+    assert not closed & set(range(48, 75)), "between the bearings and the odometry of the first point"
