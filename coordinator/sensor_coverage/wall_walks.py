@@ -12,11 +12,11 @@ from typing import Final
 import msgspec
 
 from zwerm.agents.sensor_coverage.frontier.decisions import FrontierService
-from zwerm.agents.sensor_coverage.frontier.directions import wrapped
+from zwerm.agents.sensor_coverage.frontier.directions import angle_between, wrapped
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.wall_plans import WallPlans
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Origin, WalkPoint
+from zwerm.agents.sensor_coverage.frontier.wall_proof import SAME_WALL_RAD, Origin, WalkPoint
 from zwerm.agents.sensor_coverage.messages.commands import (
     LOST,
     MET,
@@ -53,6 +53,8 @@ AXIS_BEARINGS_RAD: Final = tuple(math.radians(each) for each in (180, -90, 90, 0
 LINE_POINTS_MIN: Final = 4
 LINE_OFF_M: Final = 0.02
 LINE_ALONG_M: Final = 0.1
+# A leg leads where the walk was before if each place in touch is within this distance [m] of an earlier one at the same wall.
+AGAIN_M: Final = 0.03
 # Dead robots that a command names at most: the ones that fell silent last. An id has 5 bytes at most.
 DEAD_MAX: Final = 500
 
@@ -213,7 +215,8 @@ class WallWalks:
     def _legs(self, leader: int, origin: int, there: Walked, leg: FollowWall, scan: ScanResult) -> Routine[None]:
         """Follow the wall, leg by leg, from the slot `origin`; `there` is the way to the wall.
 
-        The robot got clear with the wall at its other hand: so it passes its first slot.
+        The robot got clear with the wall at its other hand: so it passes its first slot. A leg that leads where the walk was
+        before is the last one: only the noise of bearings could still close something.
         """
         slots, idle_legs = self._slots, 0
         number: int | None = None
@@ -224,6 +227,7 @@ class WallWalks:
             if walked is None:
                 return
             there, stays = walked, walked.end in (LOST, MET)
+            repeats = leads_again(way, walked.waypoints)
             way += walked.waypoints
             number = slots.take_walk(leader, leg.hand, walked.waypoints, walked.radius_m, number, stays)
             if stays:
@@ -232,6 +236,8 @@ class WallWalks:
             self.idle = without_witnesses(self.idle, slots.walks[number].points)
             before, left = left, self._open(scan)
             idle_legs = idle_legs + 1 if left > before - PROGRESS_RAD or walked.end == SHUT else 0
+            if repeats:
+                break
         self._measure(leader, origin, there, way)
         self.idle[slots.slot_of()[leader]] = None
 
@@ -300,6 +306,19 @@ def past_dead(command: ToWall | FollowWall, silent: Collection[int]) -> ToWall |
         return command
     named = ToWallPastDead if isinstance(command, ToWall) else FollowWallPastDead
     return named(**msgspec.structs.asdict(command), dead=dead)
+
+
+def leads_again(way: Sequence[Waypoint], leg: Iterable[Waypoint]) -> bool:
+    """Return whether a leg leads along walls where the way before it led, by odometry."""
+    in_touch = [each for each in leg if each.touched]
+    return bool(in_touch) and all(any(_is_again(each, before) for before in way) for each in in_touch)
+
+
+def _is_again(point: Waypoint, before: Waypoint) -> bool:
+    """Return whether a robot is in touch with the same wall at the same place as before."""
+    return math.dist((point.x_m, point.y_m), (before.x_m, before.y_m)) < AGAIN_M and any(
+        angle_between(a, b) < SAME_WALL_RAD for a in point.touched for b in before.touched
+    )
 
 
 def _line(waypoints: Sequence[Waypoint]) -> float | None:
