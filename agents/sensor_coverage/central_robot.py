@@ -162,6 +162,7 @@ class CentralRobot(Controller):
                 result.near,
                 self.motion.radius_m,
                 self.wall_walk.start,
+                () if result.way is None else result.way.arcs_beside(),
             )
         )
 

@@ -16,7 +16,7 @@ from zwerm.agents.sensor_coverage.frontier.directions import angle_between, wrap
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.wall_plans import WallPlans
-from zwerm.agents.sensor_coverage.frontier.wall_proof import SAME_WALL_RAD, Origin, WalkPoint
+from zwerm.agents.sensor_coverage.frontier.wall_proof import ANYONE, SAME_WALL_RAD, Origin, WalkPoint
 from zwerm.agents.sensor_coverage.messages.commands import (
     LOST,
     MET,
@@ -152,9 +152,10 @@ class WallWalks:
     def _note_near(self, robot: int, slot: int, walked: Walked, hand: int) -> None:
         """Record how a robot followed a wall close to its slot: what closes arcs there, and what others saw of it."""
         heading = self._slots.heading[robot]
-        arcs = [(start + heading, width) for start, width in walked.near]
-        # A robot that followed the wall and got neither past the arc nor clear has followed all walls around.
-        self._walls.note_near(slot, arcs, 0 if walked.end == SHUT else hand)
+        for near, who in ((walked.near, robot), (walked.near_beside, ANYONE)):
+            arcs = [(start + heading, width) for start, width in near]
+            # A robot that followed the wall and got neither past the arc nor clear has followed all walls around.
+            self._walls.note_near(slot, arcs, 0 if walked.end == SHUT else hand, who)
         if len(walked.waypoints) > 1:
             origin = Origin(slot, walked.start)
             number = self._slots.take_walk(robot, hand, walked.waypoints, walked.radius_m, origin=origin)

@@ -24,6 +24,7 @@ from zwerm.agents.sensor_coverage.frontier.directions import (
     refined_reference,
 )
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
+    ANYONE,
     Arc,
     NearArc,
     Origin,
@@ -186,7 +187,7 @@ class Slots:
                 if slot in known:
                     known[slot] = [each + by for each in known[slot]]
             self.near[slot] = [
-                NearArc(Arc(arc.start_rad + by, arc.width_rad), hand) for arc, hand in self.near.get(slot, ())
+                each._replace(arc=Arc(each.arc.start_rad + by, each.arc.width_rad)) for each in self.near.get(slot, ())
             ]
         self.walks = [each.turned(new, by) if each.frame == old else each for each in self.walks]
         spin = cmath.exp(1j * by)
@@ -249,13 +250,13 @@ class Slots:
         self._near_robot[slot] = self.occupant[slot]
 
     def take_replaced(self) -> tuple[int, ...]:
-        """Forget the walls close to slots at which another robot stands, and return these slots.
+        """Forget the arcs that count for the former robots of slots at which others stand now, and return these slots.
 
-        It may stand 0.05 m from where the former one did, and sees a wall 0.1 m away in other directions.
+        A robot may stand 0.05 m from where the former one did, and sees a wall 0.1 m away in other directions.
         """
         replaced = tuple(slot for slot, robot in self._near_robot.items() if self.occupant.get(slot) != robot)
         for slot in replaced:
-            self.near.pop(slot, None)
+            self.near[slot] = [each for each in self.near.get(slot, ()) if each.robot == ANYONE]
             del self._near_robot[slot]
         return replaced
 

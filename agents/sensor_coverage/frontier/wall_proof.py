@@ -3,10 +3,9 @@
 Every triangle of the proof has a standing robot i as a corner. Robot i sees the two other corners. One of these may be
 a point of a walk along a wall. Its sides are free lines of sight, or a step of the walk. So i sees the whole triangle.
 A robot is closed if such triangles fill the full turn around it. The robots at the ends of a triangle's side are
-responsible for the space beyond it. Beyond a step of a walk is a wall. An open arc is frontier until a robot went
-there.
+responsible for the space beyond it. Beyond a step of a walk is a wall. An open arc is frontier until a robot went there.
 
-An obstacle that lies within one triangle is not found. The triangle's sides are at most r_v long.
+An obstacle that lies within one triangle, whose sides are at most r_v long, is not found.
 
 A triangle of two slots and a point of a walk counts only if the space beyond its sides is proved, too: two such triangles
 with different points may cross, and each slot would rely on the other's (`frontier.fans`).
@@ -54,6 +53,7 @@ HIDDEN_RAD: Final = math.radians(30.0)
 NEWS_RAD: Final = 0.02
 # A followed wall lies beyond a line of sight if it closes the direction this far [rad] beside it.
 BESIDE_RAD: Final = 0.02
+ANYONE: Final = -1  # any robot at a slot
 # Arcs apart by less than this [rad] are stored as one.
 HAIR_RAD: Final = 1e-9
 
@@ -78,11 +78,12 @@ class Crossing(NamedTuple):
 class NearArc(NamedTuple):
     """An arc around a slot in which its robot followed a wall close to it, with the wall at its `hand`, +1 left, -1 right.
 
-    The hand is 0 if the robot followed all walls around, and did not turn back.
+    The hand is 0 if the robot followed all walls around, and did not turn back. The arc counts for the `robot`, or for ANYONE.
     """
 
     arc: Arc
     hand: int
+    robot: int = ANYONE
 
 
 class WalkPoint(NamedTuple):

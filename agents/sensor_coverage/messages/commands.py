@@ -241,8 +241,8 @@ class Walked(_UplinkMessage, frozen=True, tag="walked"):
     """The end of a drive to a wall or along it, after `driven_m`; `end` is one of OPEN, SHUT, STRETCH, LOST and MET.
 
     (x, y) [m] is the way from the place where the robot stood before it drove to the wall, by odometry. `near` has
-    arcs (start, width) [rad] around that place in which the robot followed a wall close to it, and `radius_m` is that of
-    its body.
+    arcs (start, width) [rad] around that place in which the robot followed a wall close to it, `near_beside` those for a robot
+    that stands a little beside that place, and `radius_m` is that of its body.
     """
 
     cycle: int
@@ -254,6 +254,7 @@ class Walked(_UplinkMessage, frozen=True, tag="walked"):
     near: tuple[tuple[float, float], ...] = ()
     radius_m: float = 0.0
     start: tuple[float, float] = (0.0, 0.0)
+    near_beside: tuple[tuple[float, float], ...] = ()
 
 
 class Ack(_UplinkMessage, frozen=True, tag="ack"):

@@ -11,9 +11,16 @@ from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.frontier.proofs.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import united_round
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, Origin, Walk, turned_vector
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, Origin, Walk, contains, turned_vector
 from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
-from zwerm.agents.sensor_coverage.motion.walls.near_arcs import NearPoint, NearWay, arcs_around, start_in_sight
+from zwerm.agents.sensor_coverage.motion.walls.near_arcs import (
+    NearPoint,
+    NearWay,
+    arcs_around,
+    arcs_around_all,
+    places_beside,
+    start_in_sight,
+)
 from zwerm.agents.sensor_coverage.motion.walls.waypoint_choice import (
     LEG_BYTES_MAX,
     SIGHTING_BYTES,
@@ -23,6 +30,8 @@ from zwerm.agents.sensor_coverage.motion.walls.waypoint_choice import (
 from zwerm.maths.simplicial import FlagComplex
 
 RADIUS_M = 0.07
+# Eight places on a circle stand for all: between two of them an arc may end this much [rad] earlier.
+TOLERANCE_RAD = math.radians(4.0)
 SLOT, OTHER = (0.0, 0.0), (-0.9, 0.1)
 NORTH, EAST = (math.pi / 2.0,), (0.0,)
 # The robot goes west along the south face, round the corner, and north along the west face.
@@ -71,7 +80,7 @@ def is_closed(arcs: list[Arc], direction_deg: float) -> bool:
 def test_a_way_round_a_corner_closes_no_directions_past_the_corner() -> None:
     """The robot is in touch all the way round the corner. Its steps along the south face are in the directions past it."""
     touch = [*WAY[:3], ((-0.17, 0.02), (math.radians(56.0),)), ((-0.2, 0.05), (math.radians(23.0),)), *WAY[5:]]
-    closed = [arc for arc, _ in near_arcs(touch)]
+    closed = [each.arc for each in near_arcs(touch)]
     assert is_closed(closed, 130.0)
     assert not any(is_closed(closed, each) for each in (155.0, 165.0, 170.0, 174.0))
 
@@ -123,13 +132,35 @@ def test_what_a_robot_saw_of_its_way_counts_while_it_stands_there() -> None:
 def test_another_robot_at_a_slot_does_not_know_the_walls_close_to_it() -> None:
     slots = Slots()
     slots.occupant[4] = 9
-    slots.note_near(4, [NearArc(Arc(0.0, 1.0), 1)])
+    own, for_all = NearArc(Arc(0.0, 1.0), 1, 9), NearArc(Arc(0.2, 0.6), 1)
+    slots.note_near(4, [own, for_all])
     assert slots.take_replaced() == ()
-    assert 4 in slots.near
+    assert slots.near[4] == [own, for_all]
     slots.occupant[4] = 8
     assert slots.take_replaced() == (4,)
-    assert 4 not in slots.near
+    assert slots.near[4] == [for_all]
     assert slots.take_replaced() == ()
+
+
+@pytest.mark.parametrize("wall_m", [0.08, 0.15, 0.3])
+def test_walls_that_another_robot_at_a_slot_knows_are_closed_wherever_it_stands(wall_m: float) -> None:
+    """The robot follows a wall in the south, and the one in the east behind a corner."""
+    south, (east,) = -math.pi / 2.0, EAST
+    points = [
+        NearPoint((0.01 * each, RADIUS_M - wall_m), (south, east) if each == 30 else (south,)) for each in range(31)
+    ]
+    points += [NearPoint((0.3, RADIUS_M - wall_m + 0.01 * each), EAST) for each in range(1, 31)]
+    places = places_beside(SLOT, points, RADIUS_M)
+    assert all(y > -wall_m + 0.6 * RADIUS_M for _, y in places), "no body is in the wall"
+    closed = united_round(Arc(*each) for each in arcs_around_all(places, points, -1, RADIUS_M))
+    here = united_round(Arc(*each) for each in arcs_around(SLOT, points, -1, RADIUS_M))
+    assert math.radians(20.0) < sum(each.width_rad for each in closed) < sum(each.width_rad for each in here)
+    tight = [Arc(each.start_rad + TOLERANCE_RAD, each.width_rad - 2.0 * TOLERANCE_RAD) for each in closed]
+    for number in range(60):
+        x, y = 0.05 * math.cos(0.4 * number), 0.05 * math.sin(0.4 * number)
+        if y > -wall_m + RADIUS_M:
+            there = united_round(Arc(*each) for each in arcs_around((x, y), points, -1, RADIUS_M))
+            assert all(contains(there, each) for each in tight if each.width_rad > 0.0), (x, y)
 
 
 def test_a_triangle_across_one_of_robots_closes_nothing() -> None:

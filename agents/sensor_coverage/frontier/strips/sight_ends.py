@@ -101,7 +101,7 @@ def shortened(near: Iterable[NearArc]) -> list[Arc]:
     """
     return [
         Arc(arc.start_rad + max(hand, 0) * BESIDE_EDGE_RAD, arc.width_rad - abs(hand) * BESIDE_EDGE_RAD)
-        for arc, hand in near
+        for arc, hand, _ in near
         if arc.width_rad > abs(hand) * BESIDE_EDGE_RAD
     ]
 

@@ -1,7 +1,7 @@
 """The arcs around a slot that its robot closes when it leaves the slot along a wall close to it, by odometry."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import combinations, dropwhile, pairwise
 from typing import Final, NamedTuple
 
@@ -15,10 +15,13 @@ from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import (
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     CONTACT_RAD,
     SAME_WALL_RAD,
+    Arc,
     Crossing,
     arc_between,
     arcs_into,
     leaves_wall,
+    shared_arcs,
+    united,
 )
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
 from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
@@ -29,6 +32,9 @@ NEAR_M_MIN: Final = 0.02
 # as a body differ by 150 degrees or more, as two switches show them. So do those of a wedge, but there the robot turns back.
 CORNER_RAD: Final = math.radians(125.0)
 WEDGE_RAD: Final = math.radians(175.0)
+# Another robot at a slot may stand this far [m] from the former one. The arcs of so many places on that circle are compared.
+BESIDE_M: Final = 0.05
+PLACES: Final = 8
 # A way shorter than this [m] leads nowhere: the robot is wedged.
 WEDGED_M: Final = 0.005
 # The place of a touched point is known within this part of a body's radius, by the width of a switch. So far a wall goes on
@@ -70,6 +76,11 @@ class NearWay:
     def arcs(self) -> tuple[tuple[float, float], ...]:
         """Return the arcs (start, width) [rad] around the start that the way closes."""
         return arcs_around(self._start, self._points, self.hand, self._radius_m)
+
+    def arcs_beside(self) -> tuple[tuple[float, float], ...]:
+        """Return the arcs (start, width) [rad] that the way closes around each place where another robot may stand."""
+        places = places_beside(self._start, self._points, self._radius_m)
+        return arcs_around_all(places, self._points, self.hand, self._radius_m)
 
     def seen_from_start(self) -> list[Waypoint]:
         """Return the waypoints from the first one that has a direction from the start."""
@@ -119,6 +130,25 @@ def arcs_around(
     is_clear = begins_clear, bool(points) and not points[-1].at_robot
     found += _arcs_of_stretch(start, stretch, hand, radius_m, is_clear)
     return tuple((a, width) if width >= 0.0 else (a + width, -width) for a, width in found)
+
+
+def places_beside(start: Vector, points: Iterable[NearPoint], radius_m: float) -> list[Vector]:
+    """Return the places [m] around a start where another robot may stand: those that bodies can get to, between walls."""
+    touched = [touched_point(each.at, wall, radius_m) for each in points for wall in each.walls]
+    around = (unit(math.tau * number / PLACES) for number in range(PLACES))
+    places = ((start[0] + BESIDE_M * x, start[1] + BESIDE_M * y) for x, y in around)
+    return [start, *(place for place in places if all(math.dist(place, each) > FREE * radius_m for each in touched))]
+
+
+def arcs_around_all(
+    places: Iterable[Vector], points: Sequence[NearPoint], hand: int, radius_m: float
+) -> tuple[tuple[float, float], ...]:
+    """Return the arcs (start, width) [rad] that a way closes around each of some places; see `arcs_around`."""
+    shared = [Arc(0.0, math.tau)]
+    for place in places:
+        closed = united(Arc(*each) for each in arcs_around(place, points, hand, radius_m))
+        shared = [part for each in shared for other in closed for part in shared_arcs(each, other)]
+    return tuple(shared)
 
 
 def _turns_back(start: Vector, points: Sequence[NearPoint], number: int) -> bool:

@@ -47,12 +47,13 @@ IDLE_LEGS_MAX: Final = 2
 
 
 class WalkResult(NamedTuple):
-    """The end of a walk; the fields have the meaning of `Walked`."""
+    """The end of a walk; the fields have the meaning of `Walked`. `way` is that close to the start, if there was one."""
 
     end: str
     driven_m: float = 0.0
     waypoints: tuple[Waypoint, ...] = ()
     near: tuple[tuple[float, float], ...] = ()
+    way: NearWay | None = None
 
 
 DriveToWalk = Generator[BodyVelocity, None, WalkResult]
@@ -146,7 +147,7 @@ class WallWalk:
         self._near_points.end()
         self._touched.end()
         self._way_near = None
-        return WalkResult(end, driven_m, tuple(first_of_message(way.seen_from_start())), way.arcs())
+        return WalkResult(end, driven_m, tuple(first_of_message(way.seen_from_start())), way.arcs(), way)
 
     def _held_points(self, report: Callable[[Waypoint], None]) -> HeldPoints:
         """Return what takes in the points of the way from here."""
