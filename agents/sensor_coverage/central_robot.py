@@ -143,8 +143,9 @@ class CentralRobot(Controller):
         result = yield from drive
         self.motion.settle()
         seen = result.used_odometry, result.used_moving_landmarks
-        way_m = math.dist(self._left, self.motion.position)
-        self.commands.answer(Arrived(cycle, result.ok, *seen, result.driven_m, result.touched, way_m))
+        (x, y), (left_x, left_y) = self.motion.position, self._left
+        way = x - left_x, y - left_y
+        self.commands.answer(Arrived(cycle, result.ok, *seen, result.driven_m, result.touched, way))
 
     def _walk(self, cycle: int, walk: DriveToWalk) -> Drive:
         """Drive to a wall or along it, and answer with the result."""

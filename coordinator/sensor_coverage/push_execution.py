@@ -13,6 +13,7 @@ from zwerm.agents.sensor_coverage.frontier.directions import wrapped
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
+from zwerm.agents.sensor_coverage.frontier.wall_proof import turned_vector
 from zwerm.agents.sensor_coverage.messages.commands import Arrived, Cleared, ComeBack, Correct, Deploy, Move, Sighting
 from zwerm.agents.sensor_coverage.motion.push_geometry import (
     FIRST_BEARINGS_RAD,
@@ -108,7 +109,7 @@ class PushExecution:
             there_now = yield from self.correct(leader, [(each, back) for each in anchors])
             slot = slots.slot_of().get(leader)
             if there_now is not None and slot is not None:
-                slots.note_way(plan.mover, slot, there_now.way_m, False)
+                slots.note_way(plan.mover, slot, turned_vector(there_now.way, slots.heading[leader]), False)
         return (*followers, leader)
 
     def prepare(self, plan: Plan) -> Routine[None]:
@@ -246,7 +247,7 @@ class PushExecution:
             if by_odometry and (slot, rear) not in slots.length_m and rear in slots.occupant and back is not None:
                 there = yield from self.correct(robot, [(slots.occupant[rear], back - slots.heading[robot])])
             if there is not None:
-                slots.note_way(rear, slot, there.way_m, by_odometry)
+                slots.note_way(rear, slot, turned_vector(there.way, slots.heading[robot]), by_odometry)
             rear = slot
 
     def _home_again(

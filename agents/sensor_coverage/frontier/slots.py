@@ -63,7 +63,9 @@ class Slots:
         self._near_robot: dict[int, int] = {}  # whose way that was, by slot
         self.walks: list[Walk] = []
         self.length_m: dict[tuple[int, int], float] = {}
-        self._way_m: dict[tuple[int, int], float] = {}  # driven from slot to slot, at the last time
+        self._ways: dict[
+            tuple[int, int], tuple[float, float]
+        ] = {}  # driven from slot to slot, since walls were forgotten
         self.frame: dict[int, int] = {}
         self._heading_readings: dict[int, int] = {}
         self._reference: dict[int, dict[int, Reference]] = {}  # by the slot that sees, then by the slot that it sees
@@ -189,6 +191,9 @@ class Slots:
             self.near[slot] = [
                 each._replace(arc=Arc(each.arc.start_rad + by, each.arc.width_rad)) for each in self.near.get(slot, ())
             ]
+        for (start, end), way in self._ways.items():
+            if start in turned:
+                self._ways[start, end] = turned_vector(way, by)
         self.walks = [each.turned(new, by) if each.frame == old else each for each in self.walks]
         spin = cmath.exp(1j * by)
         for slot in turned:
@@ -303,22 +308,28 @@ class Slots:
 
     def _distance_m(self, a: int, b: int) -> float:
         """Return the distance [m] of two slots as it was measured or driven last, or infinity."""
-        known = self.length_m.get((a, b)) or self._way_m.get((a, b)) or self._way_m.get((b, a))
-        return math.inf if known is None else known
+        known = self.length_m.get((a, b))
+        way = self._ways.get((a, b)) or self._ways.get((b, a))
+        return known or (math.inf if way is None else math.hypot(*way))
 
-    def note_way(self, start: int, end: int, way_m: float, by_odometry: bool) -> None:
-        """Note the distance [m] that a robot drove from slot to slot.
+    def note_way(self, start: int, end: int, way: tuple[float, float], by_odometry: bool) -> None:
+        """Note the way (x, y) [m] that a robot drove from slot to slot, in the frame of the directions.
 
         If it differs from what a former robot drove, the robot stands elsewhere: what former robots saw of walls closes nothing
         there. So it may if it found its place by odometry, where nobody drove before. Attempts at its arcs are not counted
         anew: where robots die one after the other, they had no end.
         """
-        known = self._way_m.get((start, end), self.length_m.get((start, end)))
-        if by_odometry if known is None else abs(known - way_m) > DISPLACED_M_MIN:
+        known, length_m = self._ways.get((start, end)), self.length_m.get((start, end))
+        if known is not None:
+            is_off = math.dist(known, way) > DISPLACED_M_MIN
+        else:
+            is_off = by_odometry if length_m is None else abs(length_m - math.hypot(*way)) > DISPLACED_M_MIN
+        if is_off:
             seen = any(end in point.seen for walk in self.walks for point in walk.points)
             if seen or self.near.get(end):
                 self._forget_walls({end: None})
-        self._way_m[start, end] = way_m
+        if is_off or known is None:
+            self._ways[start, end] = way
 
     def _forget_walls(self, slots: Mapping[int, None]) -> None:
         """Forget what was seen from these slots of robots that followed walls."""

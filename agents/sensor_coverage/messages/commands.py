@@ -224,8 +224,8 @@ class Arrived(_UplinkMessage, frozen=True, tag="arrived"):
 
     With `ok` False the robot is back at its start, or did not reach its goal. `used_odometry`: bearings did not
     determine the distance. `used_moving_landmarks`: the landmarks that stood still did not determine the goal, but others
-    were driving themselves. `touched` are bearings [rad] of touched walls. `way_m` is the distance by odometry from the place
-    where the robot stood before it was deployed or moved to another slot.
+    were driving themselves. `touched` are bearings [rad] of touched walls. `way` is the way (x, y) [m] by odometry from the
+    place where the robot stood before it was deployed or moved to another slot.
     """
 
     cycle: int
@@ -234,7 +234,7 @@ class Arrived(_UplinkMessage, frozen=True, tag="arrived"):
     used_moving_landmarks: bool
     driven_m: float
     touched: tuple[float, ...]
-    way_m: float = 0.0
+    way: tuple[float, float] = (0.0, 0.0)
 
 
 class Walked(_UplinkMessage, frozen=True, tag="walked"):

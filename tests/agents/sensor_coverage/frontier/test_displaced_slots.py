@@ -72,18 +72,22 @@ def test_a_robot_that_stands_less_than_a_body_beside_its_slot_is_not_displaced()
 
 
 @pytest.mark.parametrize(
-    ("ways_m", "remains"),
+    ("ways", "remains"),
     [
-        pytest.param((0.5, 0.45), True, id="as far as the first robot"),
-        pytest.param((0.5, 0.7), False, id="farther, in the same direction"),
-        pytest.param((0.5,), True, id="the first robot of the slot"),
+        pytest.param(((0.5, 0.0), (0.45, 0.0)), True, id="as far as the first robot"),
+        pytest.param(((0.5, 0.0), (0.62, 0.0)), False, id="farther, in the same direction"),
+        pytest.param(((0.5, 0.0), (0.49, 0.11)), False, id="as far, in another direction"),
+        pytest.param(((0.5, 0.0), (0.44, 0.0), (0.38, 0.0)), False, id="less far from robot to robot"),
+        pytest.param(((0.5, 0.0),), True, id="the first robot of the slot"),
     ],
 )
-def test_a_slot_is_displaced_along_a_line_of_sight(ways_m: tuple[float, ...], remains: bool) -> None:
-    """Bearings do not show it: the robots that the slot sees are all in one line with it."""
+def test_a_slot_is_displaced_where_bearings_do_not_show_it(
+    ways: tuple[tuple[float, float], ...], remains: bool
+) -> None:
+    """The robots that the slot sees are all in one line with it, or stand beside their slots, too."""
     slots = three_slots()
-    for number, way_m in enumerate(ways_m):
-        slots.note_way(0, 1, way_m, by_odometry=number > 0)
+    for number, way in enumerate(ways):
+        slots.note_way(0, 1, way, by_odometry=number > 0)
     assert (1 in slots.near) is remains
     assert slots.take_displaced() == (), "attempts are not counted anew"
 
@@ -91,13 +95,13 @@ def test_a_slot_is_displaced_along_a_line_of_sight(ways_m: tuple[float, ...], re
 def test_a_robot_that_drove_as_far_as_was_measured_stands_at_its_slot() -> None:
     slots = three_slots()
     slots.length_m[0, 1] = 0.5
-    slots.note_way(0, 1, 0.5, by_odometry=True)
+    slots.note_way(0, 1, (0.5, 0.0), by_odometry=True)
     assert 1 in slots.near
 
 
 def test_a_slot_to_which_nobody_drove_before_may_be_displaced() -> None:
     slots = three_slots()
-    slots.note_way(0, 1, 0.5, by_odometry=True)
+    slots.note_way(0, 1, (0.5, 0.0), by_odometry=True)
     assert 1 not in slots.near
     assert [tuple(each.seen) for each in slots.walks[0].points] == [(0,), (0,)]
 
@@ -106,7 +110,7 @@ def test_a_slot_to_which_nobody_drove_before_may_be_displaced() -> None:
 def test_walls_close_by_are_forgotten_where_a_new_robot_stands_beside_its_slot(off_deg: float, remains: bool) -> None:
     slots = three_slots()
     walks = slots.walks
-    slots.note_way(0, 1, 0.9, by_odometry=False)
+    slots.note_way(0, 1, (0.9, 0.0), by_odometry=False)
     slots.occupant[1] = 13
     slots.learn_references(views(math.radians(off_deg)))
     assert (1 in slots.near) is remains
