@@ -63,9 +63,8 @@ class Slots:
         self._near_robot: dict[int, int] = {}  # whose way that was, by slot
         self.walks: list[Walk] = []
         self.length_m: dict[tuple[int, int], float] = {}
-        self._ways: dict[
-            tuple[int, int], tuple[float, float]
-        ] = {}  # driven from slot to slot, since walls were forgotten
+        # Driven from slot to slot, by the first robot or the first displaced one.
+        self._ways: dict[tuple[int, int], tuple[float, float]] = {}
         self.frame: dict[int, int] = {}
         self._heading_readings: dict[int, int] = {}
         self._reference: dict[int, dict[int, Reference]] = {}  # by the slot that sees, then by the slot that it sees
@@ -305,7 +304,7 @@ class Slots:
             self._forget_walls(displaced)
 
     def _distance_m(self, a: int, b: int) -> float:
-        """Return the distance [m] of two slots as it was measured or driven last, or infinity."""
+        """Return the distance [m] of two slots as it was measured, or driven (`note_way`), or infinity."""
         known = self.length_m.get((a, b))
         way = self._ways.get((a, b)) or self._ways.get((b, a))
         return known or (math.inf if way is None else math.hypot(*way))

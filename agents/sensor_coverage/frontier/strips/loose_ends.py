@@ -114,21 +114,19 @@ def kept_part(
     """
     low, high = 0.0, 1.0
 
-    def leaks(part: float, stretch_end: StretchEnd) -> bool:
+    def leaks(part: float, line: tuple[Vector, Vector]) -> bool:
         part = min(max(part, INWARD), 1.0 - INWARD)
         at = start[0] + part * (end[0] - start[0]), start[1] + part * (end[1] - start[1])
-        (x, y), (wall_x, wall_y) = stretch_end.at, stretch_end.touched
-        beside = 2.0 * x - wall_x, 2.0 * y - wall_y
-        return _crosses(at, there_rad + part * step_rad, beside, stretch_end.touched)
+        return _crosses(at, there_rad + part * step_rad, *line)
 
-    def edge_of(inside: float, outside: float, stretch_end: StretchEnd) -> float:
+    def edge_of(inside: float, outside: float, line: tuple[Vector, Vector]) -> float:
         for _ in range(HALVINGS):
             middle = (inside + outside) / 2.0
-            inside, outside = (inside, middle) if leaks(middle, stretch_end) else (middle, outside)
+            inside, outside = (inside, middle) if leaks(middle, line) else (middle, outside)
         return inside
 
     between = range(1, math.ceil(abs(step_rad) / WITHIN_RAD))
-    for each in ends:
+    for each in map(_across, ends):
         first, last = leaks(low, each), leaks(high, each)
         if first and last:
             return 0.0, 0.0
@@ -141,6 +139,12 @@ def kept_part(
             before, after = edge_of(low, part, each), edge_of(high, part, each)
             low, high = (low, before) if before - low > high - after else (after, high)
     return low, high
+
+
+def _across(end: StretchEnd) -> tuple[Vector, Vector]:
+    """Return the ends of the line across the walking robot's body at an end of a stretch: the last one is the touched point."""
+    (x, y), (wall_x, wall_y) = end.at, end.touched
+    return (2.0 * x - wall_x, 2.0 * y - wall_y), end.touched
 
 
 def _crosses(at: Vector, direction_rad: float, a: Vector, b: Vector) -> bool:
