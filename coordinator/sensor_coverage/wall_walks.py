@@ -33,6 +33,7 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     Walked,
     Waypoint,
 )
+from zwerm.agents.sensor_coverage.messages.walls import NearWalls
 from zwerm.agents.sensor_coverage.motion.push_geometry import FIRST_BEARINGS_RAD
 from zwerm.agents.sensor_coverage.motion.triangulation import distances_m
 from zwerm.agents.sensor_coverage.motion.walls.wall_walk import CLEAR_M, FIRST_HOP_M, IDLE_LEGS_MAX, LEG_M
@@ -152,10 +153,12 @@ class WallWalks:
     def _note_near(self, robot: int, slot: int, walked: Walked, hand: int) -> None:
         """Record how a robot followed a wall close to its slot: what closes arcs there, and what others saw of it."""
         heading = self._slots.heading[robot]
-        for near, who in ((walked.near, robot), (walked.near_beside, ANYONE)):
-            arcs = [(start + heading, width) for start, width in near]
-            # A robot that followed the wall and got neither past the arc nor clear has followed all walls around.
-            self._walls.note_near(slot, arcs, 0 if walked.end == SHUT else hand, who)
+        near, beside = walked.near.turned(heading), NearWalls(walked.near_beside).turned(heading)
+        # A robot that followed the wall and got neither past the arc nor clear has followed all walls around.
+        kind = 0 if walked.end == SHUT else hand
+        self._walls.note_near(slot, near.followed, kind, robot)
+        self._walls.note_near(slot, near.past_ends, kind, robot, True)
+        self._walls.note_near(slot, beside.followed, kind, ANYONE)
         if len(walked.waypoints) > 1:
             origin = Origin(slot, walked.start)
             number = self._slots.take_walk(robot, hand, walked.waypoints, walked.radius_m, origin=origin)

@@ -15,6 +15,7 @@ from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStre
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, Walk, WallStep
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.agents.sensor_coverage.messages.pushes import LostSight, ProvedArc
+from zwerm.agents.sensor_coverage.messages.walls import NearWalls
 from zwerm.maths.simplicial import Edge, FlagComplex
 
 # Returns the cheapest routes from sources (slot: cost to start there) through a complex.
@@ -96,8 +97,8 @@ class SlotCoverageProof(Protocol):
     def lose(self, *slots: int) -> None:
         """Forget the arcs of walks that one of these slots saw: its robot has died or left, and no robot takes it over."""
 
-    def add_near(self, arcs: Iterable[tuple[float, float]]) -> None:
-        """Add arcs (start, width) [rad] in which a wall close to the slot was followed."""
+    def add_near(self, walls: NearWalls) -> None:
+        """Add walls close to the slot that were followed."""
 
     def memory(self) -> tuple[ProvedArc, ...]:
         """Return the arcs that walks closed, for the slot's next occupant."""

@@ -13,6 +13,7 @@ from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerPara
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import united_round
 from zwerm.agents.sensor_coverage.frontier.wall_proof import ANYONE, Arc, NearArc, contains
+from zwerm.agents.sensor_coverage.messages.walls import NearArcs
 
 # Fourth element of the keys of plans to join two parts of the swarm.
 JOIN: Final = 2000
@@ -198,18 +199,19 @@ class WallPlans:
         else:
             self.tried.setdefault(plan.mover, []).append(plan.direction)
 
-    def note_near(self, slot: int, arcs: Iterable[tuple[float, float]], hand: int, robot: int = ANYONE) -> None:
+    def note_near(self, slot: int, arcs: NearArcs, hand: int, robot: int = ANYONE, are_past_ends: bool = False) -> None:
         """Record arcs (start, width) [rad] around a slot in which a wall close to it was followed, with a hand at it.
 
-        They count while the `robot` stands there, or for ANYONE.
+        The other arguments have the meaning of the fields of `NearArc`.
 
         Arcs of different walks stay apart: where they meet, a wall may end and another one begin far behind it.
         """
         known = self._slots.near.get(slot, [])
-        same = [each.arc for each in known if (each.hand, each.robot) == (hand, robot)]
+        kind = hand, robot, are_past_ends
+        same = [arc for arc, *its_kind in known if tuple(its_kind) == kind]
         fresh = [each for each in united_round(Arc(*each) for each in arcs) if not contains(same, each)]
-        kept = [each for each in known if (each.hand, each.robot) != (hand, robot) or not contains(fresh, each.arc)]
-        self._slots.note_near(slot, [*kept, *(NearArc(each, hand, robot) for each in fresh)])
+        kept = [each for each in known if each[1:] != kind or not contains(fresh, each.arc)]
+        self._slots.note_near(slot, [*kept, *(NearArc(each, *kind) for each in fresh)])
 
 
 def _edge_at_wall(arc: Arc, robots: Collection[float]) -> int:

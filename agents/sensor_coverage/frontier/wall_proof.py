@@ -79,11 +79,13 @@ class NearArc(NamedTuple):
     """An arc around a slot in which its robot followed a wall close to it, with the wall at its `hand`, +1 left, -1 right.
 
     The hand is 0 if the robot followed all walls around, and did not turn back. The arc counts for the `robot`, or for ANYONE.
+    If it `is_past_end`, no body passes there, but the wall may end.
     """
 
     arc: Arc
     hand: int
     robot: int = ANYONE
+    is_past_end: bool = False
 
 
 class WalkPoint(NamedTuple):

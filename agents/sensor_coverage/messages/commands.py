@@ -13,6 +13,7 @@ from typing import Final
 
 from msgspec import Struct
 
+from zwerm.agents.sensor_coverage.messages.walls import NearArcs, NearWalls
 from zwerm.wire.checksum import Sealed
 
 UPLINK: Final = "uplink"
@@ -240,9 +241,9 @@ class Arrived(_UplinkMessage, frozen=True, tag="arrived"):
 class Walked(_UplinkMessage, frozen=True, tag="walked"):
     """The end of a drive to a wall or along it, after `driven_m`; `end` is one of OPEN, SHUT, STRETCH, LOST and MET.
 
-    (x, y) [m] is the way from the place where the robot stood before it drove to the wall, by odometry. `near` has
-    arcs (start, width) [rad] around that place in which the robot followed a wall close to it, `near_beside` those for a robot
-    that stands a little beside that place, and `radius_m` is that of its body.
+    (x, y) [m] is the way from the place where the robot stood before it drove to the wall, by odometry. `near` are
+    the walls close to that place which the robot followed, `near_beside` has their arcs for a robot that stands a little beside
+    that place, and `radius_m` is that of its body.
     """
 
     cycle: int
@@ -251,10 +252,10 @@ class Walked(_UplinkMessage, frozen=True, tag="walked"):
     y_m: float
     driven_m: float
     waypoints: tuple[Waypoint, ...]
-    near: tuple[tuple[float, float], ...] = ()
+    near: NearWalls = NearWalls()
     radius_m: float = 0.0
     start: tuple[float, float] = (0.0, 0.0)
-    near_beside: tuple[tuple[float, float], ...] = ()
+    near_beside: NearArcs = ()
 
 
 class Ack(_UplinkMessage, frozen=True, tag="ack"):

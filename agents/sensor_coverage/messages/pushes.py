@@ -8,6 +8,8 @@ from typing import NamedTuple
 
 from msgspec import Struct
 
+from zwerm.agents.sensor_coverage.messages.walls import NearWalls
+
 
 class WalkTriangle(NamedTuple):
     """A triangle of two slots and a point of a walk, for one of the slots; the other one is `beside`.
@@ -142,23 +144,23 @@ class TakeSlot(_PushMessage, frozen=True, tag="take-slot"):
 class PushAborted(_PushMessage, frozen=True, tag="aborted"):
     """The push has ended and no robot has moved. `tried`: its leader tried to drive.
 
-    `near` has arcs (start, width) [rad] around the base's point, in which the leader followed a wall.
+    `near` are the walls close to the base's point that the leader followed.
     """
 
     push: int
     tried: bool
-    near: tuple[tuple[float, float], ...] = ()
+    near: NearWalls = NearWalls()
 
 
 class AllStanding(_PushMessage, frozen=True, tag="all-standing"):
     """All robots ahead of the receiver stand still.
 
-    From the leader to its follower, or from the base's point to the base, `near` has arcs (start, width) [rad] around the
-    slot that the leader has left, in which it followed a wall close to that slot.
+    From the leader to its follower, or from the base's point to the base, `near` are the walls close to the
+    slot that the leader has left, which it followed.
     """
 
     push: int
-    near: tuple[tuple[float, float], ...] = ()
+    near: NearWalls = NearWalls()
 
 
 class AllSettled(_PushMessage, frozen=True, tag="all-settled"):

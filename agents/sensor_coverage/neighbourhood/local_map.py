@@ -5,7 +5,7 @@ A robot plans only for the edges at its own slot, and only as their mover.
 
 import cmath
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from itertools import islice
 from typing import Final, NamedTuple
 
@@ -17,6 +17,7 @@ from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, mark_of
 from zwerm.agents.sensor_coverage.messages.beacons import NO_PATH_VECTOR, NOWHERE, Route, SeenRobot, StateBeacon
 from zwerm.agents.sensor_coverage.messages.pushes import SlotMemory
+from zwerm.agents.sensor_coverage.messages.walls import NearWalls
 from zwerm.agents.sensor_coverage.neighbourhood.attempt_exchange import attempts_at, other_end, take_over
 from zwerm.agents.sensor_coverage.neighbourhood.neighbour_table import NeighbourTable
 from zwerm.agents.sensor_coverage.neighbourhood.obstructions import Obstructions
@@ -322,8 +323,8 @@ class LocalMap(NeighbourTable):
         self.replan()
         return self._planner.next_plan(plan)
 
-    def note_near(self, near: Iterable[tuple[float, float]]) -> None:
-        """Record arcs (start, width) [rad] around this slot in which a wall close to it was followed."""
+    def note_near(self, near: NearWalls) -> None:
+        """Record walls close to this slot that were followed."""
         self.proof.add_near(near)
         self.replan()
 

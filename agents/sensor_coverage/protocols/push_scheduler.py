@@ -122,10 +122,10 @@ class PushScheduler(Component):
             case RedundantOffer(_, slots):
                 self._offers[slots[0]] = slots
             case PushAborted(push, tried, near) if push == self._active:
-                if near:
+                if near.followed:
                     self._map.note_near(near)
                 self._end(tried)
-            case AllStanding(push, near) if push == self._active and near:
+            case AllStanding(push, near) if push == self._active and near.followed:
                 self._map.note_near(near)
             case PushDone(push) if push == self._active:
                 self._end(True, True)

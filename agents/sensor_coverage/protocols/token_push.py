@@ -215,7 +215,7 @@ class TokenPush(PushPart, LeadPush, WallPush):
         self._enter("standing")
         if self._is_noisy and self._stays():
             self._situation.stand()  # others home on it
-        if self._near:
+        if self._near.followed:
             self._map.note_near(self._near)
         if self._chain.is_rear:
             self._behind_settled = True

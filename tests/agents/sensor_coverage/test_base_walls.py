@@ -8,12 +8,13 @@ from zwerm.agents.sensor_coverage.local_robot import LocalRobot
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.agents.sensor_coverage.messages.commands import SHUT, STRETCH
 from zwerm.agents.sensor_coverage.messages.pushes import AllStanding, PushAborted
+from zwerm.agents.sensor_coverage.messages.walls import NearWalls
 from zwerm.agents.sensor_coverage.motion.walls.wall_walk import WalkResult
 from zwerm.deploy.node_specs import node_specs
 from zwerm.scenario.load import load
 
 SCENARIO = load("sensor-coverage", ("robots.count=14", "services.path=gradient"))
-NEAR = ((0.3, 0.5), (2.0, 0.25))
+NEAR = NearWalls(((0.3, 0.5), (2.0, 0.25)), ((0.8, 0.1),))
 PUSH = 7
 
 
@@ -25,7 +26,10 @@ def test_the_base_takes_the_arcs_of_a_wall_that_was_followed_beside_it_into_its_
     assert isinstance(base, LocalBase)
     base.schedule._active = PUSH
     base.components.dispatch(3, body, 1)
-    assert [(each.start_rad, each.width_rad) for each in base.local_map.proof.memory()] == list(NEAR)
+    assert [(each.start_rad, each.width_rad) for each in base.local_map.proof.memory()] == [
+        *NEAR.followed,
+        *NEAR.past_ends,
+    ]
 
 
 @pytest.mark.parametrize("end", [SHUT, STRETCH])
@@ -38,4 +42,6 @@ def test_a_robot_that_leads_from_the_base_reports_the_arcs_that_it_closed_there(
     push._approached(WalkResult(end, 0.1, near=NEAR))
     sent = push.end if end == SHUT else robot.situation.mailbox._queues[0].bodies[0]
     assert isinstance(sent, PushAborted | AllStanding)
-    assert sent.near == tuple((pytest.approx(start + 0.2), width) for start, width in NEAR)
+    assert sent.near == NearWalls(
+        *(tuple((pytest.approx(start + 0.2), width) for start, width in each) for each in NEAR)
+    )

@@ -16,10 +16,10 @@ from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
 from zwerm.agents.sensor_coverage.motion.walls.near_arcs import (
     NearPoint,
     NearWay,
-    arcs_around,
     arcs_around_all,
     places_beside,
     start_in_sight,
+    walls_around,
 )
 from zwerm.agents.sensor_coverage.motion.walls.waypoint_choice import (
     LEG_BYTES_MAX,
@@ -70,7 +70,10 @@ def test_a_slot_does_not_see_its_robot_on_the_other_side_of_a_thin_wall() -> Non
 
 def near_arcs(way: Way) -> list[NearArc]:
     points = [NearPoint(at, walls) for at, walls in way]
-    return [NearArc(each, -1) for each in united_round(Arc(*one) for one in arcs_around(SLOT, points, -1, RADIUS_M))]
+    return [
+        NearArc(each, -1)
+        for each in united_round(Arc(*one) for one in walls_around(SLOT, points, -1, RADIUS_M).followed)
+    ]
 
 
 def is_closed(arcs: list[Arc], direction_deg: float) -> bool:
@@ -153,13 +156,13 @@ def test_walls_that_another_robot_at_a_slot_knows_are_closed_wherever_it_stands(
     places = places_beside(SLOT, points, RADIUS_M)
     assert all(y > -wall_m + 0.6 * RADIUS_M for _, y in places), "no body is in the wall"
     closed = united_round(Arc(*each) for each in arcs_around_all(places, points, -1, RADIUS_M))
-    here = united_round(Arc(*each) for each in arcs_around(SLOT, points, -1, RADIUS_M))
+    here = united_round(Arc(*each) for each in walls_around(SLOT, points, -1, RADIUS_M).followed)
     assert math.radians(20.0) < sum(each.width_rad for each in closed) < sum(each.width_rad for each in here)
     tight = [Arc(each.start_rad + TOLERANCE_RAD, each.width_rad - 2.0 * TOLERANCE_RAD) for each in closed]
     for number in range(60):
         x, y = 0.05 * math.cos(0.4 * number), 0.05 * math.sin(0.4 * number)
         if y > -wall_m + RADIUS_M:
-            there = united_round(Arc(*each) for each in arcs_around((x, y), points, -1, RADIUS_M))
+            there = united_round(Arc(*each) for each in walls_around((x, y), points, -1, RADIUS_M).followed)
             assert all(contains(there, each) for each in tight if each.width_rad > 0.0), (x, y)
 
 

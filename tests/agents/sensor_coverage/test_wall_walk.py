@@ -1,7 +1,7 @@
 """Following walls: the heading that contacts allow, and whole runs in buildings whose doors the paper's rules do not find."""
 
 import math
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Sequence
 from typing import cast
 
 import pytest
@@ -9,11 +9,12 @@ import pytest
 from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import united_round
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, ends_at, united
 from zwerm.agents.sensor_coverage.messages.commands import OPEN, SHUT, STRETCH, Sighting, Waypoint
+from zwerm.agents.sensor_coverage.messages.walls import NearWalls
 from zwerm.agents.sensor_coverage.motion.locomotion import Locomotion
 from zwerm.agents.sensor_coverage.motion.motion_parameters import RobotParameters
 from zwerm.agents.sensor_coverage.motion.odometry_frame import OdometryFrame, Touched
 from zwerm.agents.sensor_coverage.motion.triangulation import distances_m
-from zwerm.agents.sensor_coverage.motion.walls.near_arcs import NearPoint, arcs_around
+from zwerm.agents.sensor_coverage.motion.walls.near_arcs import NearPoint, walls_around
 from zwerm.agents.sensor_coverage.motion.walls.wall_heading import swept
 from zwerm.agents.sensor_coverage.motion.walls.wall_walk import WEDGED_TICKS, WalkResult, WallWalk
 from zwerm.run.runner import run
@@ -49,12 +50,18 @@ def test_a_robot_goes_into_an_opening_at_its_hand() -> None:
     assert heading_deg(90.0, [(150.0, None)], 1) == 80
 
 
+def all_around(way: Sequence[NearPoint], hand: int) -> list[tuple[float, float]]:
+    """Return the arcs (start, width) [rad] around the origin of the walls along a way, and of what is past their ends."""
+    found = walls_around((0.0, 0.0), way, hand, 0.07)
+    return [*found.followed, *found.past_ends]
+
+
 def test_a_wall_followed_close_to_a_slot_closes_the_arc_of_the_corner() -> None:
     """The slot touches a wall in the west. The robot follows the wall in the north into the corner, and comes back."""
     way = [(0.1, (90,)), (0.05, (90,)), (0.0, (90, 180))]
     points = [NearPoint((x, 0.14), tuple(math.radians(each) for each in walls)) for x, walls in way]
     points += [NearPoint((0.0, y), (math.pi,)) for y in (0.09, 0.04, 0.0)]
-    arcs = arcs_around((0.0, 0.0), points, -1, 0.07)
+    arcs = all_around(points, -1)
     closed = united([Arc(*each) for each in arcs])
     assert len(closed) == 1
     first, last = closed[0].start_rad, closed[0].start_rad + closed[0].width_rad
@@ -67,7 +74,7 @@ def test_a_wall_followed_close_to_a_slot_closes_the_arc_of_the_corner() -> None:
 def test_a_corner_that_a_robot_drives_into_from_its_slot_is_closed() -> None:
     """The first point of the way is in touch with both walls of the corner."""
     points = [NearPoint((0.02, -0.13), (0.0, -math.pi / 2.0)), NearPoint((0.02, -0.08), (0.0,))]
-    closed = united([Arc(*each) for each in arcs_around((0.0, 0.0), points, -1, 0.07)])
+    closed = united([Arc(*each) for each in all_around(points, -1)])
     assert [(round(math.degrees(start)), round(math.degrees(width))) for start, width in closed] == [(271, 55)]
 
 
@@ -80,8 +87,20 @@ def test_a_wall_followed_close_to_a_slot_closes_directions_up_to_the_touched_poi
     points = [NearPoint((0.13, 0.05 * each), (0.0,)) for each in range(7)]
     for at_robot, last_deg in ((False, 58), (True, 56)):
         way = [*points[:-1], points[-1]._replace(at_robot=at_robot)]
-        arcs = arcs_around((0.0, 0.0), way, -1, 0.07)
+        arcs = all_around(way, -1)
         assert max(round(math.degrees(start + width)) for start, width in arcs if start + width < math.pi) == last_deg
+
+
+def test_a_wall_close_to_a_slot_may_end_past_the_last_touched_point_but_not_where_the_way_begins() -> None:
+    """At the begin, at 0 degrees, the robot meets the same wall with its other hand. So it does not at a second stretch."""
+    way = [NearPoint((0.13, 0.05 * each), (0.0,)) for each in range(7)]
+    leaving = [NearPoint((0.05 * each, 0.3), ()) for each in (0, -3, -6)]
+    again = [NearPoint((-0.13, 0.3 - 0.05 * each), (math.pi,)) for each in range(7)]
+    one, two = walls_around((0.0, 0.0), way, -1, 0.07), walls_around((0.0, 0.0), [*way, *leaving, *again], -1, 0.07)
+    last = united_round(Arc(*each) for each in one.followed)
+    assert [(round(math.degrees(a)) - 360, round(math.degrees(a + width)) - 360) for a, width in last] == [(-5, 56)]
+    assert [(round(math.degrees(a)), round(math.degrees(a + width))) for a, width in one.past_ends] == [(56, 58)]
+    assert len(two.past_ends) == 3
 
 
 @pytest.mark.parametrize(("back", "closes"), [(True, True), (False, False)])
@@ -92,7 +111,7 @@ def test_a_wedge_from_which_a_robot_turns_back_is_closed(back: bool, closes: boo
         NearPoint((0.15, 0.0), (math.radians(75.0), math.radians(-75.0))),
         NearPoint(after, (math.radians(75.0),)),
     ]
-    closed = united([Arc(*each) for each in arcs_around((0.0, 0.0), points, 1, 0.07)])
+    closed = united([Arc(*each) for each in all_around(points, 1)])
     assert any((0.0 - start) % math.tau < width for start, width in closed) == closes
 
 
@@ -116,14 +135,14 @@ def test_bearings_along_a_walk_determine_distances() -> None:
 def test_walls_in_different_directions_close_no_arc_between_them() -> None:
     """The robot drives from one wall to another: what is between is not followed."""
     apart = [NearPoint((0.2, 0.0), (0.0,)), NearPoint((0.0, 0.2), (math.pi / 2.0,))]
-    closed = united([Arc(*each) for each in arcs_around((0.0, 0.0), apart, 1, 0.07)])
+    closed = united([Arc(*each) for each in all_around(apart, 1)])
     assert not any((math.pi / 4.0 - start) % math.tau < width for start, width in closed)
 
 
 def test_a_robot_in_touch_is_no_wall_beside_a_slot() -> None:
     """The robot leaves its slot around another robot, which may stand in an opening."""
     way = [NearPoint((0.1, 0.14 - 0.05 * each), ()) for each in range(5)]
-    assert arcs_around((0.0, 0.0), way, 1, 0.07) == arcs_around((0.0, 0.0), way, -1, 0.07) == ()
+    assert all_around(way, 1) == all_around(way, -1) == []
 
 
 @pytest.mark.parametrize("at_body", [False, True])
@@ -131,7 +150,7 @@ def test_a_dead_body_between_two_walls_closes_no_arc_beside_a_slot(at_body: bool
     """The slot is at the mouth of a passage in the east. The robot turns round in it, before the body or at its end."""
     north, south, east = math.pi / 2.0, -math.pi / 2.0, () if at_body else (0.0,)
     first, turning = NearPoint((0.2, 0.03), (north, *east), at_body), NearPoint((0.21, 0.0), east, at_body)
-    arcs = arcs_around((0.0, 0.0), [first, turning, NearPoint((0.2, -0.03), (*east, south))], 1, 0.07)
+    arcs = all_around([first, turning, NearPoint((0.2, -0.03), (*east, south))], 1)
     closed = united(Arc(*each) for each in arcs)
     assert (sum(width for _, width in closed) > math.radians(40.0)) is not at_body
     assert at_body is not any(ends_at(closed, 0.0, side) for side in (1, -1))
@@ -139,7 +158,7 @@ def test_a_dead_body_between_two_walls_closes_no_arc_beside_a_slot(at_body: bool
 
 def test_a_wall_that_stays_in_touch_closes_the_arc_past_a_dead_body() -> None:
     way = [NearPoint((0.05 * each, 0.03), (math.pi / 2.0,), True) for each in range(1, 5)]
-    assert united([Arc(*each) for each in arcs_around((0.0, 0.0), way, 1, 0.07)])
+    assert united([Arc(*each) for each in all_around(way, 1)])
 
 
 class Wedged:
@@ -249,7 +268,7 @@ def test_a_probe_closes_an_arc_to_a_wall_close_to_its_slot_and_returns(hand: int
     robot = Facing(0.1)
     found = ended(WallWalk(cast(Locomotion, robot)).probe(0.0, 0.14, hand, math.radians(40.0)))
     assert (found.end, robot.position) == (STRETCH, (0.0, 0.0))
-    closed = united_round(Arc(*each) for each in found.near)
+    closed = united_round(Arc(*each) for each in found.near.followed)
     assert len(closed) == 1
     last = math.remainder(closed[0].start_rad + (closed[0].width_rad if hand < 0 else 0.0), math.tau)
     assert 40.0 < -hand * math.degrees(last) < 75.0
@@ -258,7 +277,7 @@ def test_a_probe_closes_an_arc_to_a_wall_close_to_its_slot_and_returns(hand: int
 def test_a_probe_finds_no_wall_farther_away() -> None:
     robot = Facing(0.3)
     found = ended(WallWalk(cast(Locomotion, robot)).probe(0.0, 0.14, 1, math.radians(40.0)))
-    assert (found.end, found.near, robot.position) == (OPEN, (), (0.0, 0.0))
+    assert (found.end, found.near, robot.position) == (OPEN, NearWalls(), (0.0, 0.0))
 
 
 def test_a_step_from_one_wall_to_the_opposite_one_closes_nothing() -> None:
@@ -266,7 +285,7 @@ def test_a_step_from_one_wall_to_the_opposite_one_closes_nothing() -> None:
     ways = ((math.pi / 2.0,), (-math.pi / 2.0,)), ((0.0,), (0.0,))
     for walls, closes in zip(ways, (False, True), strict=True):
         way = [NearPoint((0.1, 0.03), walls[0]), NearPoint((0.1, -0.03), walls[1])]
-        arcs = united(Arc(*each) for each in arcs_around((0.0, 0.0), way, 1, 0.07))
+        arcs = united(Arc(*each) for each in all_around(way, 1))
         assert any(ends_at(arcs, 0.0, side) for side in (1, -1)) is closes
 
 

@@ -35,6 +35,7 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
 )
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.agents.sensor_coverage.messages.pushes import LostSight, ProvedArc, WalkTriangle
+from zwerm.agents.sensor_coverage.messages.walls import NearWalls
 from zwerm.maths.simplicial import FlagComplex
 from zwerm.maths.sums import added
 
@@ -294,7 +295,7 @@ class SlotProof:
         """Take in an arc from another robot."""
         needed, seen = self._others(proved.needed), self._others(proved.seen)
         if (needed, seen) == NEAR:
-            self.add_near([(proved.start_rad, proved.width_rad)])
+            self.add_near(NearWalls(((proved.start_rad, proved.width_rad),)))
         elif proved.triangle is None:
             self._add(needed, seen, Arc(proved.start_rad, proved.width_rad))
         else:
@@ -324,10 +325,12 @@ class SlotProof:
         for walk, touches in self._touches.items():
             self._touches[walk] = [each for each in touches if not any(slot in each.seen for slot in slots)]
 
-    def add_near(self, arcs: Iterable[tuple[float, float]]) -> None:
-        """Add arcs (start, width) [rad] in which a wall close to the slot was followed. Those of different walks stay apart."""
+    def add_near(self, walls: NearWalls) -> None:
+        """Add walls close to the slot that were followed. Their arcs of different walks stay apart."""
         self._open = None
-        fresh = [each for each in united_round(Arc(*each) for each in arcs) if not contains(self._near, each)]
+        for each in walls.past_ends:
+            self._add((NOWHERE,), (), Arc(*each))
+        fresh = [each for each in united_round(Arc(*each) for each in walls.followed) if not contains(self._near, each)]
         self._near = [*(each for each in self._near if not contains(fresh, each)), *fresh]
 
     def edges(self) -> tuple[LostSight, ...]:

@@ -101,8 +101,8 @@ def shortened(near: Iterable[NearArc]) -> list[Arc]:
     """
     return [
         Arc(arc.start_rad + max(hand, 0) * BESIDE_EDGE_RAD, arc.width_rad - abs(hand) * BESIDE_EDGE_RAD)
-        for arc, hand, _ in near
-        if arc.width_rad > abs(hand) * BESIDE_EDGE_RAD
+        for arc, hand, _, is_past_end in near
+        if not is_past_end and arc.width_rad > abs(hand) * BESIDE_EDGE_RAD
     ]
 
 

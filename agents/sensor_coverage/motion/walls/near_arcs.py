@@ -7,6 +7,7 @@ from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.directions import angle_between
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import (
+    StretchEnd,
     direction_of,
     ends_of_stretch,
     kept_part,
@@ -24,6 +25,7 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     united,
 )
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
+from zwerm.agents.sensor_coverage.messages.walls import NearArcs, NearWalls
 from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
 
 # Points closer [m] to the start have no direction from there.
@@ -73,11 +75,11 @@ class NearWay:
         """Take in the next point."""
         self._points.append(point)
 
-    def arcs(self) -> tuple[tuple[float, float], ...]:
+    def walls(self) -> NearWalls:
         """Return the arcs (start, width) [rad] around the start that the way closes."""
-        return arcs_around(self._start, self._points, self.hand, self._radius_m)
+        return walls_around(self._start, self._points, self.hand, self._radius_m)
 
-    def arcs_beside(self) -> tuple[tuple[float, float], ...]:
+    def arcs_beside(self) -> NearArcs:
         """Return the arcs (start, width) [rad] that the way closes around each place where another robot may stand."""
         places = places_beside(self._start, self._points, self._radius_m)
         return arcs_around_all(places, self._points, self.hand, self._radius_m)
@@ -89,19 +91,18 @@ class NearWay:
         )
 
 
-def arcs_around(
-    start: Vector, points: Sequence[NearPoint], hand: int, radius_m: float
-) -> tuple[tuple[float, float], ...]:
-    """Return the arcs (start, width) [rad] around a start in which a wall was followed in touch, by odometry.
+def walls_around(start: Vector, points: Sequence[NearPoint], hand: int, radius_m: float) -> NearWalls:
+    """Return the walls around a start that were followed in touch, by odometry.
 
     Two successive points close the arc between them, if the wall is beyond, up to the touched points at the ends of a stretch
     (`frontier.strips.loose_ends`), and a part of a body beyond, but not where the way leads back round a corner in sight of
-    the start (`frontier.strips.crossings`). Two successive contacts with the same wall close the arc
+    the start (`frontier.strips.crossings`). What is beyond is past an end, except where the way begins: the robot meets the
+    same wall there with its other hand. Two successive contacts with the same wall close the arc
     between the touched points of the wall. So do two contacts at the same point, because a body does not pass between them:
     those of a corner, or of a wedge from which the robot turned back. A dead robot may fill an opening: from there on only
     the same wall closes an arc, up to the next wall. A step from one wall to the opposite one closes nothing.
     """
-    found = list[tuple[float, float]]()
+    found, past_ends = list[tuple[float, float]](), list[tuple[float, float]]()
     in_sight = [
         start_in_sight(start, [each.at for each in points[: number + 1]], hand, radius_m) is not None
         for number in range(len(points))
@@ -111,6 +112,19 @@ def arcs_around(
         for a, b in combinations(each.walls, 2):
             if angle_between(a, b) < limit_rad:
                 found.append(_between(start, *(touched_point(each.at, wall, radius_m) for wall in (a, b))))
+
+    def close(stretch: Sequence[tuple[NearPoint, bool]], is_clear: tuple[bool, bool]) -> None:
+        touching = [number for number, (each, _) in enumerate(stretch) if each.walls]
+        if len(touching) < 2:
+            return
+        ends = ends_of_stretch([(each.at, each.walls) for each, _ in stretch if each.walls], hand, radius_m)
+        found.extend(_arcs_of_stretch(start, stretch[touching[0] : touching[-1] + 1], ends, hand))
+        begins_here = stretch[touching[0]][0] is points[0]
+        for number, (end, clear) in enumerate(zip(ends, is_clear, strict=True)):
+            if clear:
+                arc = _arc_past(start, end, hand if number == 0 else -hand, radius_m)
+                (found if begins_here and number == 0 else past_ends).append(arc)
+
     at_body = False
     stretch: list[tuple[NearPoint, bool]] = []
     begins_clear = False
@@ -123,13 +137,18 @@ def arcs_around(
             stretch = [*(stretch or [(before, was_in_sight)]), (point, is_in_sight)]
         else:
             is_clear = begins_clear, not (before.at_robot or point.at_robot)
-            found += _arcs_of_stretch(start, stretch, hand, radius_m, is_clear)
+            close(stretch, is_clear)
             stretch = []
         for a, b in same:
             found.append(_between(start, touched_point(before.at, a, radius_m), touched_point(point.at, b, radius_m)))
     is_clear = begins_clear, bool(points) and not points[-1].at_robot
-    found += _arcs_of_stretch(start, stretch, hand, radius_m, is_clear)
-    return tuple((a, width) if width >= 0.0 else (a + width, -width) for a, width in found)
+    close(stretch, is_clear)
+    return NearWalls(_positive(found), _positive(past_ends))
+
+
+def _positive(arcs: Iterable[tuple[float, float]]) -> NearArcs:
+    """Return arcs (start, width) [rad] with widths to the left."""
+    return tuple((start, width) if width >= 0.0 else (start + width, -width) for start, width in arcs)
 
 
 def places_beside(start: Vector, points: Iterable[NearPoint], radius_m: float) -> list[Vector]:
@@ -140,13 +159,11 @@ def places_beside(start: Vector, points: Iterable[NearPoint], radius_m: float) -
     return [start, *(place for place in places if all(math.dist(place, each) > FREE * radius_m for each in touched))]
 
 
-def arcs_around_all(
-    places: Iterable[Vector], points: Sequence[NearPoint], hand: int, radius_m: float
-) -> tuple[tuple[float, float], ...]:
-    """Return the arcs (start, width) [rad] that a way closes around each of some places; see `arcs_around`."""
+def arcs_around_all(places: Iterable[Vector], points: Sequence[NearPoint], hand: int, radius_m: float) -> NearArcs:
+    """Return the arcs (start, width) [rad] in which a wall was followed around each of some places; see `walls_around`."""
     shared = [Arc(0.0, math.tau)]
     for place in places:
-        closed = united(Arc(*each) for each in arcs_around(place, points, hand, radius_m))
+        closed = united(Arc(*each) for each in walls_around(place, points, hand, radius_m).followed)
         shared = [part for each in shared for other in closed for part in shared_arcs(each, other)]
     return tuple(shared)
 
@@ -161,27 +178,12 @@ def _turns_back(start: Vector, points: Sequence[NearPoint], number: int) -> bool
 
 
 def _arcs_of_stretch(
-    start: Vector,
-    points: Sequence[tuple[NearPoint, bool]],
-    hand: int,
-    radius_m: float,
-    is_clear: tuple[bool, bool],
+    start: Vector, points: Sequence[tuple[NearPoint, bool]], ends: Iterable[StretchEnd], hand: int
 ) -> Iterator[tuple[float, float]]:
     """Yield the arcs (start, width) [rad] around a start that the steps along one stretch of wall close.
 
-    Each point states whether it is in sight of the start. `is_clear` states for each end whether no robot was in touch there:
-    one may stand in an opening.
+    Each point states whether it is in sight of the start.
     """
-    touching = [number for number, (each, _) in enumerate(points) if each.walls]
-    if len(touching) < 2:
-        return
-    points = points[touching[0] : touching[-1] + 1]
-    ends = ends_of_stretch([(each.at, each.walls) for each, _ in points if each.walls], hand, radius_m)
-    for end, sign, clear in zip(ends, (1, -1), is_clear, strict=True):
-        if clear:  # from the touched point along the wall, away from the stretch
-            ux, uy = unit(direction_of(end.at, end.touched) + sign * hand * math.pi / 2.0)
-            beyond = end.touched[0] + OVERHANG * radius_m * ux, end.touched[1] + OVERHANG * radius_m * uy
-            yield _between(start, end.touched, beyond)
     crossings = list[Crossing]()
     for (before, was_in_sight), (point, is_in_sight) in pairwise(points):
         first, width = _between(start, before.at, point.at)
@@ -194,6 +196,17 @@ def _arcs_of_stretch(
         elif was_in_sight or is_in_sight:  # round a corner, out of the strip beside the wall
             crossings.append(Crossing(arc_between(first, first + width), -1))
     yield from arcs_into(crossings)
+
+
+def _arc_past(start: Vector, end: StretchEnd, hand: int, radius_m: float) -> tuple[float, float]:
+    """Return the arc (start, width) [rad] around a start past an end of a stretch, a part of a body long.
+
+    The stretch leads on from this end with the wall at the `hand`.
+    """
+    ux, uy = unit(direction_of(end.at, end.touched) + hand * math.pi / 2.0)
+    return _between(
+        start, end.touched, (end.touched[0] + OVERHANG * radius_m * ux, end.touched[1] + OVERHANG * radius_m * uy)
+    )
 
 
 def start_in_sight(start: Vector, way: Sequence[Vector], hand: int, radius_m: float) -> float | None:

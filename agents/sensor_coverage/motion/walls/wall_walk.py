@@ -12,6 +12,7 @@ from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.directions import angle_between
 from zwerm.agents.sensor_coverage.messages.commands import LOST, MET, OPEN, SHUT, STRETCH, Sighting, Waypoint
+from zwerm.agents.sensor_coverage.messages.walls import NearWalls
 from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
 from zwerm.agents.sensor_coverage.motion.locomotion import Locomotion
 from zwerm.agents.sensor_coverage.motion.walls.dead_bodies import DeadBodies, HeldPoints
@@ -52,7 +53,7 @@ class WalkResult(NamedTuple):
     end: str
     driven_m: float = 0.0
     waypoints: tuple[Waypoint, ...] = ()
-    near: tuple[tuple[float, float], ...] = ()
+    near: NearWalls = NearWalls()
     way: NearWay | None = None
 
 
@@ -147,7 +148,7 @@ class WallWalk:
         self._near_points.end()
         self._touched.end()
         self._way_near = None
-        return WalkResult(end, driven_m, tuple(first_of_message(way.seen_from_start())), way.arcs(), way)
+        return WalkResult(end, driven_m, tuple(first_of_message(way.seen_from_start())), way.walls(), way)
 
     def _held_points(self, report: Callable[[Waypoint], None]) -> HeldPoints:
         """Return what takes in the points of the way from here."""

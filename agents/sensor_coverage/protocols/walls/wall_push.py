@@ -7,7 +7,7 @@ new slot, and the deployment goes on from there.
 
 import math
 from abc import abstractmethod
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Sequence
 from typing import Final, Protocol
 
 from zwerm.agents.sensor_coverage.frontier.directions import wrapped
@@ -15,6 +15,7 @@ from zwerm.agents.sensor_coverage.frontier.plan import WALLS, Plan
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.agents.sensor_coverage.messages.commands import LOST, OPEN, SHUT, STRETCH, Sighting, Waypoint
 from zwerm.agents.sensor_coverage.messages.pushes import AllStanding, Body, PushAborted
+from zwerm.agents.sensor_coverage.messages.walls import NearWalls
 from zwerm.agents.sensor_coverage.motion.push_drives import DriveResult
 from zwerm.agents.sensor_coverage.motion.triangulation import distances_m
 from zwerm.agents.sensor_coverage.motion.walls.wall_walk import IDLE_LEGS_MAX, WalkResult, WallWalk
@@ -72,7 +73,7 @@ class WallPush:
     _way: tuple[Waypoint, ...] = ()  # points of the walk
     _has_helped = False  # the walk has closed a part of an arc
     _is_idle = False  # the walk has closed nothing, and ended where the robot behind is out of sight
-    _near: tuple[tuple[float, float], ...] = ()  # arcs around this robot's slot that the leader has closed
+    _near = NearWalls()  # around this robot's slot, which the leader has followed
     _probes: Sequence[tuple[Plan, int]] = ()  # probes that are left, with the hand at the wall
     _has_probed = False
     _is_spare = False  # the walk has ended in sight of the swarm, which needs no robot there
@@ -144,16 +145,13 @@ class WallPush:
         """Go on with the next probe; after the last one, lead where an arc is still open."""
         self._has_probed = True
         if isinstance(result, WalkResult):
-            self._map.note_near(self._turned(result.near))
+            self._map.note_near(result.near.turned(self._heading))
         (plan, _), *left = self._probes
         is_open = isinstance(result, WalkResult) and result.end == OPEN
         self._probes = [each for each in left if not (is_open and each[0] is plan)]
         if not self._probe():
             self._situation.stand()
             self.lead()
-
-    def _turned(self, near: Iterable[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
-        return tuple((start + self._heading, width) for start, width in near)
 
     def _approach(self, plan: Plan) -> None:
         """Drive into an open arc, to a wall, and past the edge of the arc: the walk begins there, and closes all of it."""
@@ -163,9 +161,7 @@ class WallPush:
 
     def _approached(self, result: DriveResult | WalkResult) -> None:
         """Leave the slot to the follower, unless there is no way to get clear of it."""
-        near: tuple[tuple[float, float], ...] = ()
-        if isinstance(result, WalkResult):
-            near = self._turned(result.near)
+        near = result.near.turned(self._heading) if isinstance(result, WalkResult) else NearWalls()
         if not isinstance(result, WalkResult) or result.end == SHUT:
             at_base = self._map.slot == NOWHERE
             if not at_base:

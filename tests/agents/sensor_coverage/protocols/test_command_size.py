@@ -11,6 +11,7 @@ from zwerm.agents.sensor_coverage.messages.commands import Response, Sighting, W
 from zwerm.agents.sensor_coverage.messages.commands import write as write_command
 from zwerm.agents.sensor_coverage.messages.peers import CHANNEL, read_envelope, write
 from zwerm.agents.sensor_coverage.messages.pushes import LeaderReady, ProvedArc, Segment, SlotMemory, WalkTriangle
+from zwerm.agents.sensor_coverage.messages.walls import NearWalls
 from zwerm.agents.sensor_coverage.motion.walls.waypoint_choice import LEG_BYTES_MAX, SIGHTING_BYTES, WAYPOINT_BYTES
 from zwerm.agents.sensor_coverage.protocols.component import Component, Outgoing
 from zwerm.agents.sensor_coverage.protocols.component_loop import ComponentLoop
@@ -74,7 +75,8 @@ def test_the_waypoints_of_the_longest_leg_fit_into_a_command() -> None:
         point = Waypoint(math.pi, math.pi, sightings, (math.pi,) * 3, (SLOT,) * 2)
         bytes_each = WAYPOINT_BYTES + robots * SIGHTING_BYTES
         leg = (point,) * (1 + LEG_BYTES_MAX // bytes_each)
-        walked = Walked(SLOT, "stretch", math.pi, math.pi, math.pi, leg, ((math.pi, math.pi),) * 200, math.pi)
+        near = NearWalls(((math.pi, math.pi),) * 150, ((math.pi, math.pi),) * 50)
+        walked = Walked(SLOT, "stretch", math.pi, math.pi, math.pi, leg, near, math.pi)
         assert len(write_command(Response(SLOT, SLOT, SLOT, SLOT, SLOT, walked))) < MESSAGE_BYTES_MAX - 5_000
 
 

@@ -9,6 +9,7 @@ from zwerm.agents.sensor_coverage.frontier.proofs.slot_proof import EDGES_MAX, S
 from zwerm.agents.sensor_coverage.frontier.strips.stretches import StretchTracker
 from zwerm.agents.sensor_coverage.frontier.wall_proof import BLIND_MAX, WalkPoint, WallStep
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
+from zwerm.agents.sensor_coverage.messages.walls import NearArcs, NearWalls
 from zwerm.maths.simplicial import FlagComplex
 
 WALK = 5
@@ -17,6 +18,11 @@ BEFORE, BEYOND = (150, 200, 250), (250, 318, 330)
 ROBOTS = {1: 325, 2: 60, 3: 155}
 EDGE = 245, 255
 SEER = 9  # another slot that saw the walks
+
+
+def near(*arcs_deg: tuple[int, int]) -> NearArcs:
+    """Return arcs (start, width) [rad] around the slot."""
+    return tuple((math.radians(start), math.radians(width)) for start, width in arcs_deg)
 
 
 def look(proof: SlotProof, *absent: int) -> None:
@@ -142,7 +148,7 @@ def test_a_robot_that_follows_the_wall_close_to_its_slot_past_an_edge_closes_it(
     follow(proof, WALK, BEFORE)
     follow(proof, WALK + 1, BEYOND, ((4,),))
     for start, width in near_deg:
-        proof.add_near([(math.radians(start), math.radians(width))])
+        proof.add_near(NearWalls(near((start, width))))
     assert opened(proof) == []
     proof.lose(4)
     heir.inherit(proof.memory(), proof.edges())
@@ -155,9 +161,9 @@ def test_a_wall_close_to_a_slot_ends_where_its_robot_turned_back() -> None:
     proof = SlotProof()
     look(proof)
     follow(proof, WALK, BEYOND)
-    proof.add_near([(math.radians(150), math.radians(60)), (math.radians(200), math.radians(50))])
+    proof.add_near(NearWalls(near((150, 60), (200, 50)), past_ends=near((250, 15))))
     assert opened(proof) == [(245, 250)]
-    proof.add_near([(math.radians(240), math.radians(20))])
+    proof.add_near(NearWalls(near((240, 20))))
     assert opened(proof) == []
     heir = SlotProof()
     heir.inherit(proof.memory())
