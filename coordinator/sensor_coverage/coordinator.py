@@ -95,9 +95,8 @@ class SensorCoverageCoordinator:
         self.pushing = PushExecution(parameters, self.slots, self.mailbox, self.sources, planner)
         self.walls = planner.walls
         self._silent: dict[int, None] = {}
-        self.walking = WallWalks(
-            self.slots, self.mailbox, self.sources, self.pushing, planner, planner.walls, self._silent
-        )
+        parts = self.slots, self.mailbox, self.sources, self.pushing, planner
+        self.walking = WallWalks(*parts, planner.walls, self._silent)
         self.scan = ScanResult({}, FlagComplex({}), ())
         self.redundant: tuple[int, ...] = ()
         self.outcome = ""
@@ -175,11 +174,12 @@ class SensorCoverageCoordinator:
         return self.walking.walk(plan, self.scan) if plan.walk else self.pushing.push(plan)
 
     def _probes(self, plans: Sequence[Plan]) -> list[Routine[Moved]]:
-        """Return the probes of walls close to all slots, before a robot is sent along a wall."""
+        """Return probes of walls close to slots, before a robot is sent along a wall."""
         if not any(plan.walk and not plan.meet for plan in plans):
             return []
-        found = groupby(self.walls.probes(self.scan), key=lambda plan: plan.mover)
-        return [self.walking.probe(list(each)) for _, each in found]
+        found = self.walls.probes(self.scan)
+        moving = dict.fromkeys(self.slots.occupant[plan.mover] for plan in found)
+        return [self.walking.probe(list(each), moving) for _, each in groupby(found, key=lambda plan: plan.mover)]
 
     def _deploy_first(self, base: int) -> Routine[Moved]:
         """Deploy a station's first robot; where walls stop it in every direction, let it follow them."""

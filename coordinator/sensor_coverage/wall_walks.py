@@ -133,8 +133,11 @@ class WallWalks:
         yield from self._legs(leader, plan.mover, walked, FollowWall(pushing.cycle, LEG_M, plan.hand, keep, meet), scan)
         return (*followers, leader)
 
-    def probe(self, plans: Sequence[Plan]) -> Routine[Moved]:
-        """Let the robot of a slot follow walls close by, in the directions of some plans, and return to its slot."""
+    def probe(self, plans: Sequence[Plan], moving: Collection[int]) -> Routine[Moved]:
+        """Let the robot of a slot follow walls close by, in the directions of some plans, and return to its slot.
+
+        The robots `moving` do the same meanwhile: where it sees them they are not at their slots.
+        """
         slot = plans[0].mover
         robot = self._slots.occupant[slot]
         for plan in plans:
@@ -145,12 +148,12 @@ class WallWalks:
                 walked = yield from self._order(robot, command)
                 if walked is None:
                     return (robot,)
-                self._note_near(robot, slot, walked, hand)
+                self._note_near(robot, slot, walked, hand, moving)
                 if walked.end == OPEN:
                     break
         return (robot,)
 
-    def _note_near(self, robot: int, slot: int, walked: Walked, hand: int) -> None:
+    def _note_near(self, robot: int, slot: int, walked: Walked, hand: int, moving: Collection[int] = ()) -> None:
         """Record how a robot followed a wall close to its slot: what closes arcs there, and what others saw of it."""
         heading = self._slots.heading[robot]
         near, beside = walked.near.turned(heading), NearWalls(walked.near_beside).turned(heading)
@@ -161,7 +164,8 @@ class WallWalks:
         self._walls.note_near(slot, beside.followed, kind, ANYONE)
         if len(walked.waypoints) > 1:
             origin = Origin(slot, walked.start)
-            number = self._slots.take_walk(robot, hand, walked.waypoints, walked.radius_m, origin=origin)
+            way = walked.waypoints
+            number = self._slots.take_walk(robot, hand, way, walked.radius_m, origin=origin, moving=moving)
             self.idle = without_witnesses(self.idle, self._slots.walks[number].points)
 
     def axis(self, base: int) -> Routine[Sequence[float]]:

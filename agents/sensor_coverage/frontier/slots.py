@@ -10,7 +10,7 @@ frame of one robot, at first the robot's own. Two frames that meet become one.
 
 import cmath
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from operator import itemgetter
 
@@ -210,14 +210,16 @@ class Slots:
         after: int | None = None,
         stays: bool = False,
         origin: Origin | None = None,
+        moving: Collection[int] = (),
     ) -> int:
         """Store a walk of a robot along a wall, in sight of robots that stand at their slots, and return its number.
 
         It continues the walk with the number `after`. The robot stays at its end if `stays`. It began at the slot `origin`,
-        which has its place by odometry.
+        which has its place by odometry. The robots `moving` were not at their slots all the time.
         """
         heading, frame, slot_of = self.heading[robot], self.frame[robot], self.slot_of()
-        standing = {node: slot for node, slot in slot_of.items() if node != robot and self.frame[node] == frame}
+        away = {robot, *moving}
+        standing = {node: slot for node, slot in slot_of.items() if node not in away and self.frame[node] == frame}
         waypoints = tuple(waypoints)
         points = tuple(
             WalkPoint(

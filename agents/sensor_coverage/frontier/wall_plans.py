@@ -74,9 +74,16 @@ class WallPlans:
         return proof.open_arcs()
 
     def probes(self, scan: ScanResult) -> list[Plan]:
-        """Return the probes of all slots but stations, which do not move."""
-        arcs = self.open_arcs(scan).items()
-        return [each for slot, open_arcs in arcs if slot not in scan.bases for each in self.probes_at(slot, open_arcs)]
+        """Return probes that go at once: of slots that do not see each other, so that others see the probes from their places.
+
+        Stations do not move.
+        """
+        found, taken = list[Plan](), dict.fromkeys(scan.bases)
+        for slot, open_arcs in self.open_arcs(scan).items():
+            if slot not in taken and (probes := self.probes_at(slot, open_arcs)):
+                found += probes
+                taken |= dict.fromkeys((slot, *scan.complex_.neighbours[slot]))
+        return found
 
     def probes_at(self, slot: int, arcs: Iterable[Arc]) -> list[Plan]:
         """Return a plan for each arc of a slot that was not probed yet: the robot there follows a wall close by, and returns.
