@@ -27,13 +27,13 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     FollowWall,
     FollowWallPastDead,
     Move,
+    NearWalls,
     Probe,
     ToWall,
     ToWallPastDead,
     Walked,
     Waypoint,
 )
-from zwerm.agents.sensor_coverage.messages.walls import NearWalls
 from zwerm.agents.sensor_coverage.motion.push_geometry import FIRST_BEARINGS_RAD
 from zwerm.agents.sensor_coverage.motion.triangulation import distances_m
 from zwerm.agents.sensor_coverage.motion.walls.wall_walk import CLEAR_M, FIRST_HOP_M, IDLE_LEGS_MAX, LEG_M

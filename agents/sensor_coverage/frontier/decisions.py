@@ -14,8 +14,8 @@ from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStretch
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, Walk, WallStep
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
+from zwerm.agents.sensor_coverage.messages.commands import NearWalls
 from zwerm.agents.sensor_coverage.messages.pushes import LostSight, ProvedArc
-from zwerm.agents.sensor_coverage.messages.walls import NearWalls
 from zwerm.maths.simplicial import Edge, FlagComplex
 
 # Returns the cheapest routes from sources (slot: cost to start there) through a complex.

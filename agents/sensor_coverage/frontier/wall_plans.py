@@ -13,7 +13,7 @@ from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerPara
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import united_round
 from zwerm.agents.sensor_coverage.frontier.wall_proof import ANYONE, Arc, NearArc, contains
-from zwerm.agents.sensor_coverage.messages.walls import NearArcs
+from zwerm.agents.sensor_coverage.messages.commands import NearArcs
 
 # Fourth element of the keys of plans to join two parts of the swarm.
 JOIN: Final = 2000

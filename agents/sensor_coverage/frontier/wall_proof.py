@@ -37,9 +37,8 @@ POCKET_RAD: Final = math.radians(55.0)
 BLIND_MAX: Final = 3
 # Contacts at two points that differ by less than this [rad] are with the same wall: a switch is 30 degrees wide.
 SAME_WALL_RAD: Final = math.radians(35.0)
-# A robot with a hand on a wall has it on the side of the hand, and behind while it turns round a corner. It leaves the wall
-# if it drives in a direction farther than the first angle [rad] from it with the wall at the other side, or than the second
-# with the wall at the side of the hand. The direction of a contact is known within 15 degrees.
+# A robot with a hand on a wall has it on that side, and behind while it turns round a corner. It leaves the wall if it drives
+# farther than the first angle [rad] from its direction with the wall at the other side, or than the second with it at that one.
 LEAVING_RAD: Final = math.radians(110.0)
 ROUNDING_RAD: Final = math.radians(150.0)
 # Between two steps the direction of a contact with the same wall, or with its end, changes by less than this [rad].
@@ -78,8 +77,7 @@ class Crossing(NamedTuple):
 class NearArc(NamedTuple):
     """An arc around a slot in which its robot followed a wall close to it, with the wall at its `hand`, +1 left, -1 right.
 
-    The hand is 0 if the robot followed all walls around, and did not turn back. The arc counts for the `robot`, or for ANYONE.
-    If it `is_past_end`, no body passes there, but the wall may end.
+    The hand is 0 if it followed all walls around. The arc counts for the `robot`, or for ANYONE. Past an end a wall may end.
     """
 
     arc: Arc

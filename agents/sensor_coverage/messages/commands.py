@@ -9,11 +9,10 @@ random incarnation number.
 """
 
 from collections.abc import Callable
-from typing import Final
+from typing import Final, NamedTuple
 
 from msgspec import Struct
 
-from zwerm.agents.sensor_coverage.messages.walls import NearArcs, NearWalls
 from zwerm.wire.checksum import Sealed
 
 UPLINK: Final = "uplink"
@@ -25,6 +24,28 @@ SHUT: Final = "shut"
 STRETCH: Final = "stretch"
 LOST: Final = "lost"
 MET: Final = "met"
+
+
+# An arc (start, width) [rad].
+NearArcs = tuple[tuple[float, float], ...]
+
+
+class NearWalls(NamedTuple):
+    """The arcs around a slot in which its robot `followed` walls close to it, and those `past_ends` of them.
+
+    A body does not pass beside the touched point at an end, but what is in sight there is not known: the wall may end.
+    """
+
+    followed: NearArcs = ()
+    past_ends: NearArcs = ()
+
+    def turned(self, by: float) -> "NearWalls":
+        """Return the same arcs turned by an angle [rad]."""
+        return NearWalls(_turned(self.followed, by), _turned(self.past_ends, by))
+
+
+def _turned(arcs: NearArcs, by: float) -> NearArcs:
+    return tuple((start + by, width) for start, width in arcs)
 
 
 class _UplinkPart(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):

@@ -8,8 +8,6 @@ from typing import NamedTuple
 
 from msgspec import Struct
 
-from zwerm.agents.sensor_coverage.messages.walls import NearWalls
-
 
 class WalkTriangle(NamedTuple):
     """A triangle of two slots and a point of a walk, for one of the slots; the other one is `beside`.
@@ -144,23 +142,26 @@ class TakeSlot(_PushMessage, frozen=True, tag="take-slot"):
 class PushAborted(_PushMessage, frozen=True, tag="aborted"):
     """The push has ended and no robot has moved. `tried`: its leader tried to drive.
 
-    `near` are the walls close to the base's point that the leader followed.
+    `near` and `past_ends` have the arcs (start, width) [rad] of walls close to the base's point that the leader followed
+    (`commands.NearWalls`).
     """
 
     push: int
     tried: bool
-    near: NearWalls = NearWalls()
+    near: tuple[tuple[float, float], ...] = ()
+    past_ends: tuple[tuple[float, float], ...] = ()
 
 
 class AllStanding(_PushMessage, frozen=True, tag="all-standing"):
     """All robots ahead of the receiver stand still.
 
-    From the leader to its follower, or from the base's point to the base, `near` are the walls close to the
-    slot that the leader has left, which it followed.
+    From the leader to its follower, or from the base's point to the base, `near` and `past_ends` have the
+    arcs (start, width) [rad] of walls close to the slot that the leader has left, which it followed (`commands.NearWalls`).
     """
 
     push: int
-    near: NearWalls = NearWalls()
+    near: tuple[tuple[float, float], ...] = ()
+    past_ends: tuple[tuple[float, float], ...] = ()
 
 
 class AllSettled(_PushMessage, frozen=True, tag="all-settled"):

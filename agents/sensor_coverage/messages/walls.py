@@ -3,31 +3,7 @@
 Directions are in the frame of the base.
 """
 
-from collections.abc import Sequence
-from typing import NamedTuple
-
 from msgspec import Struct
-
-# An arc (start, width) [rad].
-NearArcs = tuple[tuple[float, float], ...]
-
-
-class NearWalls(NamedTuple):
-    """The arcs around a slot in which its robot `followed` walls close to it, and those `past_ends` of them.
-
-    A body does not pass beside the touched point at an end, but what is in sight there is not known: the wall may end.
-    """
-
-    followed: NearArcs = ()
-    past_ends: NearArcs = ()
-
-    def turned(self, by: float) -> "NearWalls":
-        """Return the same arcs turned by an angle [rad]."""
-        return NearWalls(_turned(self.followed, by), _turned(self.past_ends, by))
-
-
-def _turned(arcs: Sequence[tuple[float, float]], by: float) -> NearArcs:
-    return tuple((start + by, width) for start, width in arcs)
 
 
 class _WalkMessagePart(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):

@@ -16,8 +16,8 @@ from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerPara
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, mark_of
 from zwerm.agents.sensor_coverage.messages.beacons import NO_PATH_VECTOR, NOWHERE, Route, SeenRobot, StateBeacon
+from zwerm.agents.sensor_coverage.messages.commands import NearWalls
 from zwerm.agents.sensor_coverage.messages.pushes import SlotMemory
-from zwerm.agents.sensor_coverage.messages.walls import NearWalls
 from zwerm.agents.sensor_coverage.neighbourhood.attempt_exchange import attempts_at, other_end, take_over
 from zwerm.agents.sensor_coverage.neighbourhood.neighbour_table import NeighbourTable
 from zwerm.agents.sensor_coverage.neighbourhood.obstructions import Obstructions
@@ -25,8 +25,7 @@ from zwerm.agents.sensor_coverage.neighbourhood.references import References
 from zwerm.agents.sensor_coverage.protocols.path_vector import PathVectorProtocol
 from zwerm.maths.simplicial import Edge, FlagComplex, edge
 
-# Cost of a route to a robot that does not know yet whether it is at the frontier. Other robots wait and do not push
-# there.
+# Cost of a route to a robot that does not know yet whether it is at the frontier. Other robots do not push there.
 DOUBT_COST: Final = 1_000.0
 # Added cost of a route to a robot at a gap. Gaps are expanded when no edge can be expanded and no robot is in doubt.
 GAP_COST: Final = 10_000.0

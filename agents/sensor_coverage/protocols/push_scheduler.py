@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Final
 
 from zwerm.agents.sensor_coverage.frontier.plan import Plan
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE, StateBeacon
+from zwerm.agents.sensor_coverage.messages.commands import NearWalls
 from zwerm.agents.sensor_coverage.messages.incarnations import first_count
 from zwerm.agents.sensor_coverage.messages.pushes import (
     AllStanding,
@@ -121,12 +122,12 @@ class PushScheduler(Component):
                 self._situation.mailbox.write(sender, PushAborted(push, False))
             case RedundantOffer(_, slots):
                 self._offers[slots[0]] = slots
-            case PushAborted(push, tried, near) if push == self._active:
-                if near.followed:
-                    self._map.note_near(near)
+            case PushAborted(push, tried, near, past_ends) if push == self._active:
+                if near:
+                    self._map.note_near(NearWalls(near, past_ends))
                 self._end(tried)
-            case AllStanding(push, near) if push == self._active and near.followed:
-                self._map.note_near(near)
+            case AllStanding(push, near, past_ends) if push == self._active and near:
+                self._map.note_near(NearWalls(near, past_ends))
             case PushDone(push) if push == self._active:
                 self._end(True, True)
             case RedundantPushEnd(push, tried, done) if push == self._active:

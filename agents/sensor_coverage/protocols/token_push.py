@@ -25,7 +25,7 @@ import msgspec
 
 from zwerm.agents.sensor_coverage.frontier.directions import wrapped
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
-from zwerm.agents.sensor_coverage.messages.commands import Sighting
+from zwerm.agents.sensor_coverage.messages.commands import NearWalls, Sighting
 from zwerm.agents.sensor_coverage.messages.pushes import (
     AllSettled,
     AllStanding,
@@ -73,7 +73,7 @@ class TokenPush(PushPart, LeadPush, WallPush):
                 self.close(body)
             case AllStanding():
                 self._ahead_stands = True
-                self._near = body.near
+                self._near = NearWalls(body.near, body.past_ends)
             case AllSettled():
                 self._behind_settled = True
             case PushDone():

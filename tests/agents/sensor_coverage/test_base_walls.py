@@ -6,9 +6,8 @@ from zwerm.agents.runtime.node import Node
 from zwerm.agents.sensor_coverage.local_base import LocalBase
 from zwerm.agents.sensor_coverage.local_robot import LocalRobot
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
-from zwerm.agents.sensor_coverage.messages.commands import SHUT, STRETCH
+from zwerm.agents.sensor_coverage.messages.commands import SHUT, STRETCH, NearWalls
 from zwerm.agents.sensor_coverage.messages.pushes import AllStanding, PushAborted
-from zwerm.agents.sensor_coverage.messages.walls import NearWalls
 from zwerm.agents.sensor_coverage.motion.walls.wall_walk import WalkResult
 from zwerm.deploy.node_specs import node_specs
 from zwerm.scenario.load import load
@@ -18,7 +17,7 @@ NEAR = NearWalls(((0.3, 0.5), (2.0, 0.25)), ((0.8, 0.1),))
 PUSH = 7
 
 
-@pytest.mark.parametrize("body", [PushAborted(PUSH, True, NEAR), AllStanding(PUSH, NEAR)])
+@pytest.mark.parametrize("body", [PushAborted(PUSH, True, *NEAR), AllStanding(PUSH, *NEAR)])
 def test_the_base_takes_the_arcs_of_a_wall_that_was_followed_beside_it_into_its_proof(
     body: PushAborted | AllStanding,
 ) -> None:
@@ -42,6 +41,4 @@ def test_a_robot_that_leads_from_the_base_reports_the_arcs_that_it_closed_there(
     push._approached(WalkResult(end, 0.1, near=NEAR))
     sent = push.end if end == SHUT else robot.situation.mailbox._queues[0].bodies[0]
     assert isinstance(sent, PushAborted | AllStanding)
-    assert sent.near == NearWalls(
-        *(tuple((pytest.approx(start + 0.2), width) for start, width in each) for each in NEAR)
-    )
+    assert NearWalls(sent.near, sent.past_ends) == NEAR.turned(0.2)

@@ -8,8 +8,7 @@ import pytest
 
 from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import united_round
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, ends_at, united
-from zwerm.agents.sensor_coverage.messages.commands import OPEN, SHUT, STRETCH, Sighting, Waypoint
-from zwerm.agents.sensor_coverage.messages.walls import NearWalls
+from zwerm.agents.sensor_coverage.messages.commands import OPEN, SHUT, STRETCH, NearWalls, Sighting, Waypoint
 from zwerm.agents.sensor_coverage.motion.locomotion import Locomotion
 from zwerm.agents.sensor_coverage.motion.motion_parameters import RobotParameters
 from zwerm.agents.sensor_coverage.motion.odometry_frame import OdometryFrame, Touched

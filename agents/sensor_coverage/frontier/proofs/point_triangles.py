@@ -7,7 +7,7 @@ counts again only when a view or a wall has changed, also if a third slot that s
 
 import math
 from bisect import bisect_left, bisect_right
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from operator import itemgetter
 from typing import Final
 
@@ -18,15 +18,20 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import WalkPoint, arc_betw
 HIDDEN_MIN_RAD: Final = math.radians(2.0)
 
 Views = Mapping[int, Mapping[int, float]]
-# The direction [rad] of a point from a slot, and the other slots that saw it.
-_Lost = tuple[float, tuple[int, ...]]
+# The direction [rad] of a point from a slot, and the other slots that saw it, with theirs.
+_Lost = tuple[float, tuple[tuple[int, float], ...]]
 _DIRECTION: Final = itemgetter(0)
 
 
 class PointTriangles:
-    """The triangles of all points, by the number of the point."""
+    """The triangles of all points, by the number of the point.
 
-    def __init__(self) -> None:
+    `is_proved` states for a slot, a direction [rad] and another slot whether the first one stands, and the space in its
+    direction is proved without the other.
+    """
+
+    def __init__(self, is_proved: Callable[[int, float, int], bool]) -> None:
+        self._is_proved = is_proved
         self._stretch_of: dict[int, int] = {}  # the number of the first point of the stretch, by the number of a point
         self._seers: dict[int, dict[int, None]] = {}  # the slots that saw a walk, by the number of its first point
         # The points that a slot saw, each with its walk and its directions [rad].
@@ -73,16 +78,14 @@ class PointTriangles:
         versions: Mapping[int, int],
         at_walls: Beyond,
         close: Collection[Pair] = (),
-        origin: int | None = None,
     ) -> tuple[Pair, ...]:
         """Find the triangles with a point that count, each at its first slot; see `fan_of`.
 
-        `versions` count the changes of views. The triangles of the pairs `close` do not count. The walk began at the slot
-        `origin`.
+        `versions` count the changes of views. The triangles of the pairs `close` do not count.
         """
         basis = [(slot, versions[slot]) for slot in point.seen if slot in neighbours], at_walls, close
         if self._basis.get(number) == basis and not any(
-            self._hides(pair, point, views, neighbours) for pair in self._pairs[number]
+            self._hides(pair, point, views) for pair in self._pairs[number]
         ):
             return self._pairs[number]
         self._basis[number] = basis
@@ -90,21 +93,18 @@ class PointTriangles:
         while True:
             pairs = fan_of(point, views, neighbours, at_walls, hidden)
             more = [
-                pair
-                for pair in pairs
-                if self._hides(pair, point, views, neighbours)
-                or (pair[0] == origin and _crosses(pair, point, views, neighbours))
+                each for each in pairs if self._hides(each, point, views) or _crosses(each, point, views, neighbours)
             ]
             if not more:
                 self._pairs[number] = pairs
                 return pairs
             hidden |= dict.fromkeys(more)
 
-    def _hides(self, pair: Pair, point: WalkPoint, views: Views, standing: Collection[int]) -> bool:
+    def _hides(self, pair: Pair, point: WalkPoint, views: Views) -> bool:
         """Return whether the second slot lost sight of a walk within the angle at the first of their triangle with a point.
 
-        Past a corner the second slot relies on the first for what is behind it, unless others saw the walk there, too. So the
-        first does not rely on the second: the triangle does not count at the first.
+        Past a corner the second slot relies on the first for what is behind it, unless others saw the walk there, too, and do
+        not rely on the second in turn. So the first does not rely on the second: the triangle does not count at the first.
         """
         slot, other = pair
         start, width = arc_between(views[slot][other], point.seen[slot])
@@ -116,7 +116,7 @@ class PointTriangles:
         within = lost[bisect_right(lost, first, key=_DIRECTION) : bisect_left(lost, last, key=_DIRECTION)]
         if last > math.tau:
             within += lost[: bisect_left(lost, last - math.tau, key=_DIRECTION)]
-        return any(not any(each in standing for each in others) for _, others in within)
+        return any(not any(self._is_proved(*each, other) for each in others) for _, others in within)
 
     def _lost_by(self, slot: int, other: int) -> list[_Lost]:
         """Return the points that a slot saw, and another one that saw the same walk did not, by their direction [rad]."""
@@ -124,7 +124,7 @@ class PointTriangles:
         count, known = self._lost.setdefault((slot, other), (0, []))
         if count != len(points):
             known += (
-                (there % math.tau, tuple(one for one in each.seen if one != slot))
+                (there % math.tau, tuple(one for one in each.seen.items() if one[0] != slot))
                 for walk, each, directions in points[count:]
                 if other not in each.seen and other in self._seers.get(walk, ())
                 for there in directions

@@ -34,8 +34,8 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     ends_at,
 )
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
+from zwerm.agents.sensor_coverage.messages.commands import NearWalls
 from zwerm.agents.sensor_coverage.messages.pushes import LostSight, ProvedArc, WalkTriangle
-from zwerm.agents.sensor_coverage.messages.walls import NearWalls
 from zwerm.maths.simplicial import FlagComplex
 from zwerm.maths.sums import added
 

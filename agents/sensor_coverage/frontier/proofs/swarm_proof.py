@@ -6,7 +6,7 @@ A walk ends where no standing robot sees it, and the deployment goes on from the
 the robots that saw it. When one of them is gone, nothing is known of its part: the points that it saw close nothing.
 """
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
@@ -40,6 +40,7 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     arcs_of_robots,
     arcs_of_walls,
     complement,
+    contains,
     ends_at,
     overlap,
     united,
@@ -84,9 +85,12 @@ class SwarmProof:
         self._by_stretch: dict[int, dict[int, list[Arc]]] = {}  # of them those of one stretch, by slot and stretch
         self._edged: dict[int, list[Arc]] = {}  # the same arcs as `_followed` without edges of sight
         self._versions: dict[int, int] = {}  # changes of what a slot sees
-        self._triangles = PointTriangles()
+        self._triangles = PointTriangles(self._is_proved)
         self._chosen: dict[Pair, dict[int, int]] = {}  # the numbers of the points of triangles beside an edge, by side
         self._open_arcs: dict[int, list[Arc]] = {}
+        self._alone: dict[
+            tuple[int, int], list[Arc]
+        ] = {}  # by two slots: what is closed at the first one without the other
         self._settled: dict[int, None] = {}  # open slots that no other choice of points closes better
 
     def update(
@@ -174,6 +178,7 @@ class SwarmProof:
                 points |= dict.fromkeys(each.number for each in self._passed.get(slot, ()))
                 self._followed[slot] = self._arcs_to_walls(slot)
                 self._spoil(slot)
+        self._alone.clear()
         for number in points:
             old, new = self._triangles.pairs(number), self._valid(number)
             if old != new:
@@ -224,10 +229,14 @@ class SwarmProof:
 
     def _closed_by_robots(self, slot: int) -> list[Arc]:
         """Return the arcs of a slot that triangles of robots and robots in touch close."""
-        view, beside = self._scan.views[slot], self._neighbours[slot]
-        touched, robots = self._around[slot].touched, self._around[slot].in_touch
-        bodies = list(arcs_of_robots([view[each] for each in robots], touched))
-        return bodies + [arc_between(view[a], view[b]) for a in beside for b in beside & self._neighbours[a] if a < b]
+        view, around = self._scan.views[slot], self._around[slot]
+        bodies = arcs_of_robots([view[each] for each in around.in_touch], around.touched)
+        return [*bodies, *self._arcs_between(slot)]
+
+    def _arcs_between(self, slot: int, without: int | None = None) -> Iterator[Arc]:
+        """Yield the arcs of a slot in its triangles of robots, but those with one of its neighbours."""
+        view, beside = self._scan.views[slot], self._neighbours[slot] - {without}
+        yield from (arc_between(view[a], view[b]) for a in beside for b in beside & self._neighbours[a] if a < b)
 
     def _choose(self, pair: Pair) -> dict[int, int]:
         """Return the number of the point of the triangle on each side of an edge: the one that closes most at both ends.
@@ -330,8 +339,18 @@ class SwarmProof:
         standing = [slot for slot in point.seen if slot in self._neighbours]
         at_walls = {(slot, side): self._ends_beyond(slot, number, side) for slot in standing for side in (1, -1)}
         views, origins = self._scan.views, self._origins
-        beside, origin = origins.beside(number, views), origins.slot_of(number)
-        return self._triangles.find(number, point, views, self._neighbours, self._versions, at_walls, beside, origin)
+        beside = origins.beside(number, views)
+        return self._triangles.find(number, point, views, self._neighbours, self._versions, at_walls, beside)
+
+    def _is_proved(self, slot: int, there: float, other: int) -> bool:
+        """Return whether a slot stands, and walls or triangles of robots without another slot close its direction [rad]."""
+        if slot not in self._neighbours:
+            return False
+        known = self._alone.get((slot, other))
+        if known is None:
+            walls = *self._followed.get(slot, ()), *arcs_of_walls(self._around[slot].touched)
+            known = self._alone[slot, other] = united([*walls, *self._arcs_between(slot, other)])
+        return contains(known, Arc(there, 0.0))
 
     def _ends_beyond(self, slot: int, number: int, side: int) -> bool:
         """Return whether the wall that was followed at a point lies beyond the line of sight to it, on one side.

@@ -43,11 +43,6 @@ class WalkOrigins:
         """Return the robots at the slots at which walks have begun."""
         return {slot: occupants[slot] for slot in self._slots if slot in occupants}
 
-    def slot_of(self, number: int) -> int | None:
-        """Return the slot at which the walk of a point began, if it is close to the point."""
-        origin = self._origins.get(number)
-        return None if origin is None else origin.slot
-
     def standing(self, number: int, point: WalkPoint, robots: Mapping[int, int]) -> WalkPoint:
         """Return a point as if its origin had not seen it, if another robot stands there now."""
         origin = self._origins.get(number)

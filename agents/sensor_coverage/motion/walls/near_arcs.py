@@ -24,8 +24,7 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     shared_arcs,
     united,
 )
-from zwerm.agents.sensor_coverage.messages.commands import Waypoint
-from zwerm.agents.sensor_coverage.messages.walls import NearArcs, NearWalls
+from zwerm.agents.sensor_coverage.messages.commands import NearArcs, NearWalls, Waypoint
 from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
 
 # Points closer [m] to the start have no direction from there.

@@ -11,8 +11,7 @@ from collections.abc import Callable, Collection, Generator, Iterable, Sequence
 from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.directions import angle_between
-from zwerm.agents.sensor_coverage.messages.commands import LOST, MET, OPEN, SHUT, STRETCH, Sighting, Waypoint
-from zwerm.agents.sensor_coverage.messages.walls import NearWalls
+from zwerm.agents.sensor_coverage.messages.commands import LOST, MET, OPEN, SHUT, STRETCH, NearWalls, Sighting, Waypoint
 from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
 from zwerm.agents.sensor_coverage.motion.locomotion import Locomotion
 from zwerm.agents.sensor_coverage.motion.walls.dead_bodies import DeadBodies, HeldPoints

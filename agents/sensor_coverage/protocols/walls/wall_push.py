@@ -13,9 +13,8 @@ from typing import Final, Protocol
 from zwerm.agents.sensor_coverage.frontier.directions import wrapped
 from zwerm.agents.sensor_coverage.frontier.plan import WALLS, Plan
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
-from zwerm.agents.sensor_coverage.messages.commands import LOST, OPEN, SHUT, STRETCH, Sighting, Waypoint
+from zwerm.agents.sensor_coverage.messages.commands import LOST, OPEN, SHUT, STRETCH, NearWalls, Sighting, Waypoint
 from zwerm.agents.sensor_coverage.messages.pushes import AllStanding, Body, PushAborted
-from zwerm.agents.sensor_coverage.messages.walls import NearWalls
 from zwerm.agents.sensor_coverage.motion.push_drives import DriveResult
 from zwerm.agents.sensor_coverage.motion.triangulation import distances_m
 from zwerm.agents.sensor_coverage.motion.walls.wall_walk import IDLE_LEGS_MAX, WalkResult, WallWalk
@@ -167,7 +166,7 @@ class WallPush:
             if not at_base:
                 self._map.note_near(near)
             self._situation.stand()
-            self.close(PushAborted(self.id, True, near) if at_base else PushAborted(self.id, True))
+            self.close(PushAborted(self.id, True, *near) if at_base else PushAborted(self.id, True))
             return
         self._walks = result.end != OPEN
         self._anchors = () if self._walks else self._find_anchors()
@@ -175,7 +174,7 @@ class WallPush:
         self._enter("out")
         self._behind_settled = self._chain.is_rear
         self.cleared()
-        self._write(AllStanding(self.id, near))
+        self._write(AllStanding(self.id, *near))
 
     def _go_on(self) -> None:
         """Correct the scale, or follow the wall."""

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import pytest
 
-from zwerm.agents.sensor_coverage.frontier.fans import Pair, fan_of
+from zwerm.agents.sensor_coverage.frontier.fans import Pair, fan_of, is_between
 from zwerm.agents.sensor_coverage.frontier.proofs.point_triangles import HIDDEN_MIN_RAD, PointTriangles
 from zwerm.agents.sensor_coverage.frontier.wall_proof import WalkPoint, arc_between
 
@@ -47,7 +47,11 @@ def searched(point: WalkPoint, points: list[WalkPoint], views: Views, neighbours
                 and other not in each.seen
                 and not any(one in neighbours for one in each.seen if one != slot)
             ]
-            if any(HIDDEN_MIN_RAD < off < width - HIDDEN_MIN_RAD for off in offs):
+            if any(HIDDEN_MIN_RAD < off < width - HIDDEN_MIN_RAD for off in offs) or any(
+                is_between(views[slot][third], views[slot][other], point.seen[slot], HIDDEN_MIN_RAD)
+                and is_between(point.seen[other], views[other][slot], views[other][third], HIDDEN_MIN_RAD)
+                for third in neighbours[slot] & neighbours[other]
+            ):
                 more.add((slot, other))
         if not more:
             return set(pairs)
@@ -55,8 +59,8 @@ def searched(point: WalkPoint, points: list[WalkPoint], views: Views, neighbours
 
 
 def added(points: list[WalkPoint]) -> PointTriangles:
-    """Return the triangles of the points of one stretch."""
-    found = PointTriangles()
+    """Return the triangles of the points of one stretch. The space around each slot is proved without any other one."""
+    found = PointTriangles(lambda slot, there, other: True)
     for number, point in enumerate(points):
         for slot in point.seen:
             found.add(slot, number, 0, 0, point)
@@ -113,26 +117,26 @@ def test_a_later_point_of_the_same_stretch_counts() -> None:
 
 
 @pytest.mark.parametrize(
-    ("seen_by_other", "seen_by_third", "third_stands", "counts"),
+    ("seen_by_other", "seen_by_third", "third_knows", "counts"),
     [
         pytest.param(True, False, True, False, id="the other slot lost sight of the walk"),
         pytest.param(False, False, True, True, id="the other slot may have been empty during the walk"),
         pytest.param(True, True, True, True, id="a third slot is responsible"),
-        pytest.param(True, True, False, False, id="the third slot is gone"),
+        pytest.param(True, True, False, False, id="the third slot is gone, or relies on the other one"),
     ],
 )
 def test_a_point_of_another_walk_behind_a_triangle(
-    seen_by_other: bool, seen_by_third: bool, third_stands: bool, counts: bool
+    seen_by_other: bool, seen_by_third: bool, third_knows: bool, counts: bool
 ) -> None:
     views: Views = {0: {1: 0.0}, 1: {0: math.pi}}
     point = WalkPoint({0: math.radians(60.0), 1: math.radians(120.0)}, (math.pi / 2.0,), ())
-    behind = WalkPoint({0: math.radians(40.0)} | ({2: 0.0} if seen_by_third else {}), (math.pi / 2.0,), ())
+    behind = WalkPoint({0: math.radians(40.0)} | ({2: 0.5} if seen_by_third else {}), (math.pi / 2.0,), ())
     before = WalkPoint({0: math.radians(100.0), 1: math.radians(140.0)}, (math.pi / 2.0,), ())
-    triangles = PointTriangles()
+    triangles = PointTriangles(lambda slot, there, other: third_knows and (slot, there, other) == (2, 0.5, 1))
     triangles.add(0, 0, 0, 0, point)
     triangles.add(1, 0, 0, 0, point)
     at_walls = {(slot, side): True for slot in views for side in (1, -1)}
-    neighbours: dict[int, set[int]] = {0: {1}, 1: {0}} | ({2: set()} if third_stands else {})
+    neighbours: dict[int, set[int]] = {0: {1}, 1: {0}}
     assert triangles.find(0, point, views, neighbours, dict.fromkeys(views, 1), at_walls) == ((0, 1), (1, 0))
     triangles.add(0, 1, 1, 1, before)
     if seen_by_other:
@@ -173,3 +177,17 @@ def test_a_point_on_a_side_of_a_triangle_of_robots_is_not_inside_it(inside_rad: 
     views = {0: {1: 0.0, 2: 1.0}, 1: {0: math.pi, 2: 2.1}, 2: {0: -2.1, 1: -1.0}}
     neighbours = {a: set(seen) for a, seen in views.items()}
     assert bool(fan_of(point, views, neighbours, {})) is counts
+
+
+@pytest.mark.parametrize("with_third", [False, True])
+def test_a_triangle_across_a_side_of_one_of_robots_does_not_count_where_that_side_begins(with_third: bool) -> None:
+    """From slot 1 the point is behind the side between slots 0 and 2: there slot 1 relies on slot 0, and it would on slot 1."""
+    at = {0: (1.52, 1.14), 1: (0.96, 0.81)} | ({2: (1.67, 0.2)} if with_third else {})
+    place = 1.75, 1.17
+    views = {a: {b: math.atan2(y - at[a][1], x - at[a][0]) for b, (x, y) in at.items() if b != a} for a in at}
+    point = WalkPoint({each: math.atan2(place[1] - at[each][1], place[0] - at[each][0]) for each in (0, 1)}, (0.0,), ())
+    triangles = added([point])
+    at_walls = {(slot, side): True for slot in point.seen for side in (1, -1)}
+    neighbours = {slot: set(seen) for slot, seen in views.items()}
+    found = triangles.find(0, point, views, neighbours, dict.fromkeys(views, 1), at_walls)
+    assert set(found) == {(1, 0)} | (set() if with_third else {(0, 1)})

@@ -19,7 +19,7 @@ SIGHT_M: Final = 1.0
 WALK_M: Final = 0.075
 STEP_M: Final = 0.05
 ENOUGH: Final = 0.98
-DRAWN: Final = 20
+DRAWN: Final = 25
 
 Place: TypeAlias = tuple[float, float]
 

@@ -7,11 +7,10 @@ import pytest
 from zwerm.agents.sensor_coverage.frontier.proofs.slot_proof import SlotProof
 from zwerm.agents.sensor_coverage.local_node import CODECS
 from zwerm.agents.sensor_coverage.messages.beacons import StateRequest
-from zwerm.agents.sensor_coverage.messages.commands import Response, Sighting, Walked, Waypoint
+from zwerm.agents.sensor_coverage.messages.commands import NearWalls, Response, Sighting, Walked, Waypoint
 from zwerm.agents.sensor_coverage.messages.commands import write as write_command
 from zwerm.agents.sensor_coverage.messages.peers import CHANNEL, read_envelope, write
 from zwerm.agents.sensor_coverage.messages.pushes import LeaderReady, ProvedArc, Segment, SlotMemory, WalkTriangle
-from zwerm.agents.sensor_coverage.messages.walls import NearWalls
 from zwerm.agents.sensor_coverage.motion.walls.waypoint_choice import LEG_BYTES_MAX, SIGHTING_BYTES, WAYPOINT_BYTES
 from zwerm.agents.sensor_coverage.protocols.component import Component, Outgoing
 from zwerm.agents.sensor_coverage.protocols.component_loop import ComponentLoop

@@ -9,7 +9,7 @@ from zwerm.agents.sensor_coverage.frontier.proofs.slot_proof import EDGES_MAX, S
 from zwerm.agents.sensor_coverage.frontier.strips.stretches import StretchTracker
 from zwerm.agents.sensor_coverage.frontier.wall_proof import BLIND_MAX, WalkPoint, WallStep
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
-from zwerm.agents.sensor_coverage.messages.walls import NearArcs, NearWalls
+from zwerm.agents.sensor_coverage.messages.commands import NearArcs, NearWalls
 from zwerm.maths.simplicial import FlagComplex
 
 WALK = 5
