@@ -27,12 +27,12 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     FollowWall,
     FollowWallPastDead,
     Move,
-    NearWalls,
     Probe,
     ToWall,
     ToWallPastDead,
     Walked,
     Waypoint,
+    turned_arcs,
 )
 from zwerm.agents.sensor_coverage.motion.push_geometry import FIRST_BEARINGS_RAD
 from zwerm.agents.sensor_coverage.motion.triangulation import distances_m
@@ -156,12 +156,12 @@ class WallWalks:
     def _note_near(self, robot: int, slot: int, walked: Walked, hand: int, moving: Collection[int] = ()) -> None:
         """Record how a robot followed a wall close to its slot: what closes arcs there, and what others saw of it."""
         heading = self._slots.heading[robot]
-        near, beside = walked.near.turned(heading), NearWalls(walked.near_beside).turned(heading)
+        near, beside = walked.near.turned(heading), turned_arcs(walked.near_beside, heading)
         # A robot that followed the wall and got neither past the arc nor clear has followed all walls around.
         kind = 0 if walked.end == SHUT else hand
         self._walls.note_near(slot, near.followed, kind, robot)
         self._walls.note_near(slot, near.past_ends, kind, robot, True)
-        self._walls.note_near(slot, beside.followed, kind, ANYONE)
+        self._walls.note_near(slot, beside, kind, ANYONE)
         if len(walked.waypoints) > 1:
             origin = Origin(slot, walked.start)
             way = walked.waypoints

@@ -41,10 +41,11 @@ class NearWalls(NamedTuple):
 
     def turned(self, by: float) -> "NearWalls":
         """Return the same arcs turned by an angle [rad]."""
-        return NearWalls(_turned(self.followed, by), _turned(self.past_ends, by))
+        return NearWalls(turned_arcs(self.followed, by), turned_arcs(self.past_ends, by))
 
 
-def _turned(arcs: NearArcs, by: float) -> NearArcs:
+def turned_arcs(arcs: NearArcs, by: float) -> NearArcs:
+    """Return arcs turned by an angle [rad]."""
     return tuple((start + by, width) for start, width in arcs)
 
 

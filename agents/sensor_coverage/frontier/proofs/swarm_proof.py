@@ -88,9 +88,7 @@ class SwarmProof:
         self._triangles = PointTriangles(self._is_proved)
         self._chosen: dict[Pair, dict[int, int]] = {}  # the numbers of the points of triangles beside an edge, by side
         self._open_arcs: dict[int, list[Arc]] = {}
-        self._alone: dict[
-            tuple[int, int], list[Arc]
-        ] = {}  # by two slots: what is closed at the first one without the other
+        self._alone: dict[Pair, list[Arc]] = {}  # what is closed at the first slot without the second
         self._settled: dict[int, None] = {}  # open slots that no other choice of points closes better
 
     def update(

@@ -181,7 +181,7 @@ def test_a_point_on_a_side_of_a_triangle_of_robots_is_not_inside_it(inside_rad: 
 
 @pytest.mark.parametrize("with_third", [False, True])
 def test_a_triangle_across_a_side_of_one_of_robots_does_not_count_where_that_side_begins(with_third: bool) -> None:
-    """From slot 1 the point is behind the side between slots 0 and 2: there slot 1 relies on slot 0, and it would on slot 1."""
+    """From slot 1 the point is behind the side between slots 0 and 2. There slot 1 relies on slot 0, which so must not on 1."""
     at = {0: (1.52, 1.14), 1: (0.96, 0.81)} | ({2: (1.67, 0.2)} if with_third else {})
     place = 1.75, 1.17
     views = {a: {b: math.atan2(y - at[a][1], x - at[a][0]) for b, (x, y) in at.items() if b != a} for a in at}

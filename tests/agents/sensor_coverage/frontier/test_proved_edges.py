@@ -60,3 +60,19 @@ def test_a_robot_beside_an_edge_stays_only_after_its_whole_hop_where_walls_are_f
     plans = next(planner.plans())
     assert plans
     assert {each.clear_m for each in plans} == {WHOLE_HOP * parameters.hop_m if walls == "followed" else 0.8}
+
+
+def test_the_space_around_a_slot_is_proved_without_another_one_by_walls_or_triangles_of_the_others() -> None:
+    """Slot 0 followed a wall in the north west. The triangle of robots is in the north east of it."""
+    proof = SwarmProof()
+    proof.update(SCAN, [], {}, {0: [NearArc(Arc(2.0, 1.0), 1)]}, {})
+    north_east, north_west, south = 0.5, 2.5, -1.5
+    for there, other, is_proved in (
+        (north_west, 1, True),
+        (north_east, 7, True),
+        (north_east, 1, False),
+        (north_east, 2, False),
+        (south, 7, False),
+    ):
+        assert proof._is_proved(0, there, other) is is_proved
+    assert not proof._is_proved(9, north_west, 1), "slot 9 is empty"

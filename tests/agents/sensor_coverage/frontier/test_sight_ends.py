@@ -114,6 +114,15 @@ def test_an_arc_close_to_a_slot_that_is_narrower_than_an_edge_is_left_out() -> N
     assert degrees(shortened(near)) == [(5, 40), (0, 35), (0, 40)]
 
 
+def test_what_is_past_the_end_of_a_wall_close_to_a_slot_closes_no_edge() -> None:
+    arcs = NearArc(arc(0, 40), 0), NearArc(arc(40, 50), 0, is_past_end=True)
+    assert degrees(shortened(arcs)) == [(0, 40)]
+    assert open_at_0(BEYOND, near=(NearArc(arc(150, 245), 0), NearArc(arc(245, 250), 0, is_past_end=True))) == [
+        (330, 150),
+        (245, 250),
+    ]
+
+
 def test_an_island_touches_no_open_arc() -> None:
     closed = [arc(0, 90), arc(100, 180), arc(190, 300)]
     assert degrees(with_islands([arc(185, 190)], closed)) == [(185, 190), (90, 100), (300, 0)]
