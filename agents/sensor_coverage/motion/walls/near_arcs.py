@@ -90,6 +90,18 @@ class NearWay:
         )
 
 
+class _Stretch(NamedTuple):
+    """A stretch of wall along a way: the numbers of its `first` and `last` points in touch with the wall, and its two ends.
+
+    An end `is_clear` if no robot was in touch there.
+    """
+
+    first: int
+    last: int
+    ends: tuple[StretchEnd, StretchEnd]
+    is_clear: tuple[bool, bool]
+
+
 def walls_around(start: Vector, points: Sequence[NearPoint], hand: int, radius_m: float) -> NearWalls:
     """Return the walls around a start that were followed in touch, by odometry.
 
@@ -101,48 +113,70 @@ def walls_around(start: Vector, points: Sequence[NearPoint], hand: int, radius_m
     those of a corner, or of a wedge from which the robot turned back. A dead robot may fill an opening: from there on only
     the same wall closes an arc, up to the next wall. A step from one wall to the opposite one closes nothing.
     """
-    found, past_ends = list[tuple[float, float]](), list[tuple[float, float]]()
-    in_sight = [
-        start_in_sight(start, [each.at for each in points[: number + 1]], hand, radius_m) is not None
-        for number in range(len(points))
-    ]
+    stretches = list(_stretches(points, hand, radius_m))
+    past_ends = (
+        _arc_past(start, stretch.ends[number], hand if number == 0 else -hand, radius_m)
+        for stretch in stretches
+        for number, is_clear in enumerate(stretch.is_clear)
+        if is_clear and not _begins_way(stretch, number)
+    )
+    return NearWalls(_positive(_followed(start, points, stretches, hand, radius_m)), _positive(past_ends))
+
+
+def _stretches(points: Sequence[NearPoint], hand: int, radius_m: float) -> Iterator[_Stretch]:
+    """Yield the stretches of wall along a way that have two points in touch with the wall at least."""
+
+    def stretch(first: int, last: int, is_clear: tuple[bool, bool]) -> Iterator[_Stretch]:
+        touching = [number for number in range(first, last + 1) if points[number].walls]
+        if len(touching) >= 2:
+            contacts = [(points[number].at, points[number].walls) for number in touching]
+            yield _Stretch(touching[0], touching[-1], ends_of_stretch(contacts, hand, radius_m), is_clear)
+
+    at_body, begins_clear = False, False
+    first: int | None = None
+    for number, (before, point) in enumerate(pairwise(points)):
+        at_body = before.at_body or (at_body and not before.walls)
+        leaves = leaves_wall(hand, before.walls, point.walls, point.at[0] - before.at[0], point.at[1] - before.at[1])
+        past_body = (before.walls or point.walls) and not (at_body or point.at_body)
+        if not leaves and (past_body or any(_same_walls(before, point))):
+            if first is None:
+                first, begins_clear = number, not before.at_robot
+        elif first is not None:
+            yield from stretch(first, number, (begins_clear, not (before.at_robot or point.at_robot)))
+            first = None
+    if first is not None:
+        yield from stretch(first, len(points) - 1, (begins_clear, not points[-1].at_robot))
+
+
+def _begins_way(stretch: _Stretch, end: int) -> bool:
+    """Return whether an end of a stretch, 0 or 1, is where the way begins."""
+    return end == 0 and stretch.first == 0
+
+
+def _same_walls(before: NearPoint, point: NearPoint) -> Iterator[tuple[float, float]]:
+    """Yield the directions of contacts [rad] at two successive points that are with the same wall."""
+    return ((a, b) for a in before.walls for b in point.walls if angle_between(a, b) < SAME_WALL_RAD)
+
+
+def _followed(
+    start: Vector, points: Sequence[NearPoint], stretches: Iterable[_Stretch], hand: int, radius_m: float
+) -> Iterator[tuple[float, float]]:
+    """Yield the arcs (start, width) [rad] around a start in which walls were followed; see `walls_around`."""
     for number, each in enumerate(points):
         limit_rad = WEDGE_RAD if _turns_back(start, points, number) else CORNER_RAD
         for a, b in combinations(each.walls, 2):
             if angle_between(a, b) < limit_rad:
-                found.append(_between(start, *(touched_point(each.at, wall, radius_m) for wall in (a, b))))
-
-    def close(stretch: Sequence[tuple[NearPoint, bool]], is_clear: tuple[bool, bool]) -> None:
-        touching = [number for number, (each, _) in enumerate(stretch) if each.walls]
-        if len(touching) < 2:
-            return
-        ends = ends_of_stretch([(each.at, each.walls) for each, _ in stretch if each.walls], hand, radius_m)
-        found.extend(_arcs_of_stretch(start, stretch[touching[0] : touching[-1] + 1], ends, hand))
-        begins_here = stretch[touching[0]][0] is points[0]
-        for number, (end, clear) in enumerate(zip(ends, is_clear, strict=True)):
-            if clear:
-                arc = _arc_past(start, end, hand if number == 0 else -hand, radius_m)
-                (found if begins_here and number == 0 else past_ends).append(arc)
-
-    at_body = False
-    stretch: list[tuple[NearPoint, bool]] = []
-    begins_clear = False
-    for (before, was_in_sight), (point, is_in_sight) in pairwise(zip(points, in_sight, strict=True)):
-        at_body = before.at_body or (at_body and not before.walls)
-        leaves = leaves_wall(hand, before.walls, point.walls, point.at[0] - before.at[0], point.at[1] - before.at[1])
-        same = [(a, b) for a in before.walls for b in point.walls if angle_between(a, b) < SAME_WALL_RAD]
-        if not leaves and (same or (bool(before.walls or point.walls) and not (at_body or point.at_body))):
-            begins_clear = begins_clear if stretch else not before.at_robot
-            stretch = [*(stretch or [(before, was_in_sight)]), (point, is_in_sight)]
-        else:
-            is_clear = begins_clear, not (before.at_robot or point.at_robot)
-            close(stretch, is_clear)
-            stretch = []
-        for a, b in same:
-            found.append(_between(start, touched_point(before.at, a, radius_m), touched_point(point.at, b, radius_m)))
-    is_clear = begins_clear, bool(points) and not points[-1].at_robot
-    close(stretch, is_clear)
-    return NearWalls(_positive(found), _positive(past_ends))
+                yield _between(start, *(touched_point(each.at, wall, radius_m) for wall in (a, b)))
+    for before, point in pairwise(points):
+        for a, b in _same_walls(before, point):
+            yield _between(start, touched_point(before.at, a, radius_m), touched_point(point.at, b, radius_m))
+    way = [each.at for each in points]
+    in_sight = [start_in_sight(start, way[: number + 1], hand, radius_m) is not None for number in range(len(way))]
+    for stretch in stretches:
+        part = slice(stretch.first, stretch.last + 1)
+        yield from _arcs_of_stretch(start, list(zip(points[part], in_sight[part], strict=True)), stretch.ends, hand)
+        if stretch.is_clear[0] and _begins_way(stretch, 0):
+            yield _arc_past(start, stretch.ends[0], hand, radius_m)
 
 
 def _positive(arcs: Iterable[tuple[float, float]]) -> NearArcs:
@@ -160,9 +194,10 @@ def places_beside(start: Vector, points: Iterable[NearPoint], radius_m: float) -
 
 def arcs_around_all(places: Iterable[Vector], points: Sequence[NearPoint], hand: int, radius_m: float) -> NearArcs:
     """Return the arcs (start, width) [rad] in which a wall was followed around each of some places; see `walls_around`."""
+    stretches = list(_stretches(points, hand, radius_m))
     shared = [Arc(0.0, math.tau)]
     for place in places:
-        closed = united(Arc(*each) for each in walls_around(place, points, hand, radius_m).followed)
+        closed = united(Arc(*each) for each in _positive(_followed(place, points, stretches, hand, radius_m)))
         shared = [part for each in shared for other in closed for part in shared_arcs(each, other)]
     return tuple(shared)
 
