@@ -34,6 +34,8 @@ from zwerm.agents.sensor_coverage.motion.homing import unit
 # A pocket closes this part of a body's radius beyond the touched point: two of them on both sides of a robot, with an error
 # of a quarter of a radius each by the width of a switch, are narrower than an opening of 1.3 bodies.
 OVERHANG: Final = 1.0
+# A body in front of a wall is at least this part of its radius away from it, by the width of a switch of a robot in touch.
+IN_FRONT: Final = 1.0 - 2.0 * math.sin(CONTACT_RAD)
 # An opening narrower than this many diameters of a body need not be found.
 PASSABLE: Final = 1.3
 
@@ -91,8 +93,8 @@ def crossings_of_pocket(hand: int, pocket: Pocket, other_is_loose: bool) -> Iter
 def arcs_beside_pocket(hand: int, pocket: Pocket, contacts: Iterable[float]) -> Iterator[Arc]:
     """Yield the arcs at a slot that are closed beside a pocket; its robot touches walls in the directions `contacts` [rad].
 
-    No opening fits between a wall that the walking robot touched and a robot in touch with it, nor between touched points that
-    are close to each other.
+    No opening fits between a wall that the walking robot touched and a robot in touch with it, in front of the wall, nor
+    between touched points that are close to each other.
     """
     place, touched, radius_m = pocket.place, pocket.end.touched, pocket.radius_m
     if pocket.in_touch and next(crossings_of_pocket(hand, pocket, False)).into > 0:
@@ -100,11 +102,23 @@ def arcs_beside_pocket(hand: int, pocket: Pocket, contacts: Iterable[float]) -> 
         side = math.remainder(direction_of(pocket.end.at, place) - wall, math.tau)
         ux, uy = unit(wall + math.copysign(math.pi / 2.0, side))
         beyond = touched[0] + OVERHANG * radius_m * ux, touched[1] + OVERHANG * radius_m * uy
-        yield arc_between(direction_of(place, touched), direction_of(place, beyond))
+        if _is_in_front(pocket):
+            yield arc_between(direction_of(place, touched), direction_of(place, beyond))
         for each in contacts:
             yield from _arc_between_walls(pocket, touched_point(place, each, radius_m))
     if pocket.before is not None:
         yield from _arc_between_walls(pocket, pocket.before.touched)
+
+
+def _is_in_front(pocket: Pocket) -> bool:
+    """Return whether the slot's robot stands in front of the touched wall, as the walking robot does, and not past its end.
+
+    A robot beside the end of a wall, in a bend for example, sees nothing of the wall: it looks past the end into the space
+    from which the walking robot came.
+    """
+    ux, uy = unit(direction_of(pocket.end.touched, pocket.end.at))
+    ahead_m = ux * (pocket.place[0] - pocket.end.touched[0]) + uy * (pocket.place[1] - pocket.end.touched[1])
+    return ahead_m > IN_FRONT * pocket.radius_m
 
 
 def _arc_between_walls(pocket: Pocket, other: Vector) -> Iterator[Arc]:

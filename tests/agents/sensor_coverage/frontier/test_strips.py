@@ -153,7 +153,16 @@ def test_a_contact_on_the_other_side_of_a_robot_closes_nothing_between() -> None
     end = StretchEnd(at, touched_point(at, math.radians(30.0), RADIUS_M))
     pocket = Pocket(end, end, RADIUS_M, True, (0.0, 0.0), True)
     beside = [len(list(arcs_beside_pocket(-1, pocket, (math.radians(each),)))) for each in (85.0, -60.0)]
-    assert beside == [1, 2], "the arc beyond the pocket, and the one up to the contact"
+    assert beside == [0, 1], "the arc up to the contact; the robot is past the end of the wall"
+
+
+@pytest.mark.parametrize(("ahead_m", "closed"), [(0.07, 1), (0.04, 1), (0.02, 0), (-0.04, 0)])
+def test_a_robot_past_the_end_of_a_wall_does_not_see_how_it_goes_on(ahead_m: float, closed: int) -> None:
+    """The wall is in the south of the walking robot. The standing one sees the wall, or is past its end, in a bend."""
+    at = 0.14 * math.cos(math.asin((0.07 - ahead_m) / 0.14)), 0.07 - ahead_m
+    end = StretchEnd(at, (at[0], at[1] - RADIUS_M))
+    pocket = Pocket(end, end, RADIUS_M, True, (0.0, 0.0), True)
+    assert len(list(arcs_beside_pocket(1, pocket, ()))) == closed
 
 
 @pytest.mark.parametrize(("wall_deg", "pockets"), [(-90.0, 1), (170.0, 0)])
