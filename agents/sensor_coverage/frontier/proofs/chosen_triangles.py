@@ -29,8 +29,9 @@ class ChosenTriangles:
 
     Two triangles with different points may cross. If one slot relied on one of them and its neighbour on the other, each
     would be responsible for space between the two points that neither sees. It has a wall around it if the walk led from one
-    point to the other around this space. If it led round the other way, or the points are of different walks, only the
-    triangle with the larger sum of its angles at the two slots counts, which both know.
+    point to the other around this space, along one stretch of wall: where a stretch ends, a robot may have stood in front of an
+    opening. If it led round the other way, or the points are of different stretches, only the triangle with the larger sum of
+    its angles at the two slots counts, which both know.
     """
 
     def __init__(self) -> None:
@@ -87,11 +88,11 @@ def _chosen_of(known: Iterable[_KeptTriangle]) -> list[ProvedArc]:
 
 
 def _exclude(a: _KeptTriangle, b: _KeptTriangle) -> bool:
-    """Return whether two triangles cross, and no walk led from one point to the other around the space between them."""
+    """Return whether two triangles cross, and no followed wall leads from one point to the other around the space between."""
     wider, there = a.arc.width_rad - b.arc.width_rad, a.triangle.there_rad - b.triangle.there_rad
     if wider * there >= -(EQUAL_RAD**2):
         return False
-    if a.triangle.walk != b.triangle.walk:
+    if (a.triangle.walk, a.triangle.stretch) != (b.triangle.walk, b.triangle.stretch):
         return True
     later_is_wider = (a.triangle.number - b.triangle.number) * wider > 0.0
     return later_is_wider != (a.triangle.hand * a.triangle.side < 0)

@@ -58,6 +58,14 @@ def test_triangles_on_both_sides_of_an_edge_count() -> None:
     assert list(chosen(*arcs).counting((BESIDE,))) == [*arcs]
 
 
+def test_of_two_triangles_that_cross_only_one_counts_if_the_wall_between_their_points_was_not_followed_to_its_end() -> (
+    None
+):
+    """The walk met a robot between the two points, which may have stood in front of an opening and has died since."""
+    wide, narrow = triangle(1.2, 0.5, 1, stretch=1), triangle(0.4, 1.1, 9, stretch=6)
+    assert list(chosen(wide, narrow).counting((BESIDE,))) == [wide]
+
+
 def test_of_two_triangles_that_cross_only_one_counts_if_no_walk_led_around_the_space_between() -> None:
     """The points are of two walks: one may be in a passage, and the other one at the wall beside it."""
     wide, narrow, inner = triangle(1.2, 0.5, 1), triangle(0.4, 1.1, 9, walk=6), triangle(0.3, 0.4, 9, walk=7, needed=())
