@@ -300,6 +300,9 @@ class TokenPush(PushPart, LeadPush, WallPush):
         self.end = end
         self._enter("closing")
 
+    def _may_close(self) -> bool:
+        return self._may_finish() and self._is_judged()
+
     def _finish(self) -> None:
         """Send the outcome of the push to the robot behind; join no other push until that is acknowledged."""
         if self._map.moving:
@@ -371,7 +374,7 @@ PHASES: Final[Mapping[str, Phase]] = {
     "await": Phase(((lambda push: push._walk_over or push._waited_for_ahead(), lambda push: push.close(PushDone(push.id))),),
                    wake=TokenPush._wake_for_ahead),
     # All: wait until the view agrees with the neighbours, inform the robot behind, and end.
-    "closing": Phase(((TokenPush._may_finish, TokenPush._finish),), wake=TokenPush._next_tick),
+    "closing": Phase(((TokenPush._may_close, TokenPush._finish),), wake=TokenPush._next_tick),
     "telling": Phase(((TokenPush._out_of_range, TokenPush._drop),), wake=TokenPush._next_tick),
 }
 # fmt: on

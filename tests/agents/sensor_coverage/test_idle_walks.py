@@ -9,9 +9,10 @@ from zwerm.agents.sensor_coverage.frontier.plan import WALLS, Plan
 from zwerm.agents.sensor_coverage.local_robot import LocalRobot
 from zwerm.agents.sensor_coverage.messages.beacons import NO_PATH_VECTOR, PathVector, Route, SeenRobot, StateBeacon
 from zwerm.agents.sensor_coverage.messages.commands import LOST, STRETCH, Sighting, Waypoint
-from zwerm.agents.sensor_coverage.messages.pushes import ReferenceBearing, SlotMemory, TakeSlot
+from zwerm.agents.sensor_coverage.messages.pushes import PushDone, ReferenceBearing, SlotMemory, TakeSlot
 from zwerm.agents.sensor_coverage.motion.walls.wall_walk import IDLE_LEGS_MAX, WalkResult
 from zwerm.agents.sensor_coverage.protocols.token_push import TokenPush
+from zwerm.agents.sensor_coverage.protocols.walls.wall_push import NEWS_TICKS
 from zwerm.deploy.node_specs import node_specs
 from zwerm.scenario.load import load
 
@@ -54,6 +55,20 @@ def test_a_robot_leaves_after_a_walk_that_closed_nothing(
     push._walked(WalkResult(end, 0.4))
     push._leave_if_spare()
     assert robot.local_map.redundant is leaves
+
+
+def test_a_robot_whose_walk_closed_nothing_so_far_leaves_only_when_the_robot_behind_has_judged_its_place() -> None:
+    """The robot behind takes the points of the walk into its proof when it stands, and its news arrives some ticks later."""
+    robot, push = walking(beside=True)
+    push._walked(WalkResult(LOST, 0.4))
+    push.close(PushDone(7))
+    judged = [False, False, True]
+    for robot.situation.tick, expected in zip((0, NEWS_TICKS, NEWS_TICKS + 1), judged, strict=True):
+        assert push._is_judged() is expected
+    _, spare_push = walking(beside=False)
+    spare_push._walked(WalkResult(STRETCH, 0.4))
+    spare_push.close(PushDone(7))
+    assert spare_push._is_judged()
 
 
 def test_a_walk_measures_the_distances_to_its_slot_and_to_robots_in_sight_by_all_of_its_legs() -> None:

@@ -25,6 +25,8 @@ from zwerm.maths.simplicial import may_leave
 
 # Bound of the legs of one walk.
 LEGS_MAX: Final = 15
+# Ticks in which the robot behind judges the walk, once it stands, and informs the leader.
+NEWS_TICKS: Final = 20
 
 
 class WallSituation(Protocol):
@@ -80,6 +82,10 @@ class WallPush:
     @property
     @abstractmethod
     def _heading(self) -> float: ...
+
+    @property
+    @abstractmethod
+    def _waited(self) -> int: ...
 
     @abstractmethod
     def _enter(self, phase: str) -> None: ...
@@ -214,6 +220,10 @@ class WallPush:
         if plan is not None:
             self._map.distances_m[plan.mover] = math.hypot(*self._situation.wall_walk.way)
         self._settled()
+
+    def _is_judged(self) -> bool:
+        """Return whether the robot behind has had time to find that its arc is closed while the leader stands here."""
+        return not self._is_idle or self._waited > NEWS_TICKS
 
     def _leave_if_spare(self) -> None:
         """Leave the complex after a walk, unless that would part the robots around."""
