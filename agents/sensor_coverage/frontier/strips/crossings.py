@@ -36,12 +36,8 @@ from zwerm.agents.sensor_coverage.motion.homing import unit
 OVERHANG: Final = 1.0
 # A body in front of a wall is at least this part of its radius away from it, by the width of a switch of a robot in touch.
 IN_FRONT: Final = 1.0 - 2.0 * math.sin(CONTACT_RAD)
-# The bearing of a robot in touch is off by this much [rad] at most: two standard deviations of a noise of pi/72.
-BEARING_RAD: Final = math.radians(5.0)
 # An opening narrower than this many diameters of a body need not be found.
 PASSABLE: Final = 1.3
-# Between two walls whose touched points are this many radii apart no such opening fits.
-CLOSE: Final = 2.0 * (PASSABLE - math.sin(CONTACT_RAD) - math.sin(BEARING_RAD))
 
 
 def crossings_of_step(
@@ -128,10 +124,9 @@ def _is_in_front(pocket: Pocket) -> bool:
 def _arc_between_walls(pocket: Pocket, other: Vector) -> Iterator[Arc]:
     """Yield the arc from the touched wall of a pocket to another touched point [m], if no opening fits in between.
 
-    Each of the two points is known within half a switch, and the place of the slot's robot within the noise of its bearing.
-    That robot does not stand between the two.
+    Each of the two points is known within half a switch. The slot's robot does not stand between the two.
     """
     arc = arc_between(direction_of(pocket.place, pocket.end.touched), direction_of(pocket.place, other))
     apart_m = math.dist(pocket.end.touched, other)
-    if apart_m <= CLOSE * pocket.radius_m and arc.width_rad <= math.pi / 2.0:
+    if apart_m <= 2.0 * (PASSABLE - math.sin(CONTACT_RAD)) * pocket.radius_m and arc.width_rad <= math.pi / 2.0:
         yield arc
