@@ -34,8 +34,6 @@ from zwerm.agents.sensor_coverage.motion.homing import unit
 # A pocket closes this part of a body's radius beyond the touched point: two of them on both sides of a robot, with an error
 # of a quarter of a radius each by the width of a switch, are narrower than an opening of 1.3 bodies.
 OVERHANG: Final = 1.0
-# A body in front of a wall is at least this part of its radius away from it, by the width of a switch of a robot in touch.
-IN_FRONT: Final = 1.0 - 2.0 * math.sin(CONTACT_RAD)
 # An opening narrower than this many diameters of a body need not be found.
 PASSABLE: Final = 1.3
 
@@ -118,7 +116,7 @@ def _is_in_front(pocket: Pocket) -> bool:
     """
     ux, uy = unit(direction_of(pocket.end.touched, pocket.end.at))
     ahead_m = ux * (pocket.place[0] - pocket.end.touched[0]) + uy * (pocket.place[1] - pocket.end.touched[1])
-    return ahead_m > IN_FRONT * pocket.radius_m
+    return ahead_m > 0.0
 
 
 def _arc_between_walls(pocket: Pocket, other: Vector) -> Iterator[Arc]:
