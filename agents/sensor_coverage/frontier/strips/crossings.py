@@ -114,9 +114,8 @@ def _is_in_front(pocket: Pocket) -> bool:
     A robot beside the end of a wall, in a bend for example, sees nothing of the wall: it looks past the end into the space
     from which the walking robot came.
     """
-    ux, uy = unit(direction_of(pocket.end.touched, pocket.end.at))
-    ahead_m = ux * (pocket.place[0] - pocket.end.touched[0]) + uy * (pocket.place[1] - pocket.end.touched[1])
-    return ahead_m > 0.0
+    (x, y), (at_x, at_y), (wall_x, wall_y) = pocket.place, pocket.end.at, pocket.end.touched
+    return (x - wall_x) * (at_x - wall_x) + (y - wall_y) * (at_y - wall_y) > 0.0
 
 
 def _arc_between_walls(pocket: Pocket, other: Vector) -> Iterator[Arc]:
