@@ -8,6 +8,7 @@ counts again only when a view or a wall has changed, also if a third slot that s
 import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Collection, Iterable, Mapping
+from itertools import chain
 from operator import itemgetter
 from typing import Final
 
@@ -39,6 +40,8 @@ class PointTriangles:
         # The points that a slot saw, and another one that saw the same walk did not. They hold for the number of points that
         # the slot saw.
         self._lost: dict[tuple[int, int], tuple[int, list[_Lost]]] = {}
+        # Whether no other slot that saw a lost point is proved, by its number among them, until the proof of a slot changes.
+        self._bare: dict[Pair, dict[int, bool]] = {}
         self._basis: dict[int, tuple[object, object, object]] = {}
         self._pairs: dict[int, tuple[Pair, ...]] = {}
 
@@ -68,6 +71,10 @@ class PointTriangles:
         """Let no triangle with a point count."""
         self._pairs.pop(number, None)
         self._basis.pop(number, None)
+
+    def forget_proved(self) -> None:
+        """Forget what `is_proved` stated: the proof of a slot has changed."""
+        self._bare.clear()
 
     def find(
         self,
@@ -113,10 +120,15 @@ class PointTriangles:
         lost = self._lost_by(slot, other)
         first = (start + HIDDEN_MIN_RAD) % math.tau
         last = first + width - 2.0 * HIDDEN_MIN_RAD
-        within = lost[bisect_right(lost, first, key=_DIRECTION) : bisect_left(lost, last, key=_DIRECTION)]
-        if last > math.tau:
-            within += lost[: bisect_left(lost, last - math.tau, key=_DIRECTION)]
-        return any(not any(self._is_proved(*each, other) for each in others) for _, others in within)
+        within = range(bisect_right(lost, first, key=_DIRECTION), bisect_left(lost, last, key=_DIRECTION))
+        beyond = range(bisect_left(lost, last - math.tau, key=_DIRECTION) if last > math.tau else 0)
+        bare = self._bare.setdefault(pair, {})
+        for each in chain(within, beyond):
+            if each not in bare:
+                bare[each] = not any(self._is_proved(*one, other) for one in lost[each][1])
+            if bare[each]:
+                return True
+        return False
 
     def _lost_by(self, slot: int, other: int) -> list[_Lost]:
         """Return the points that a slot saw, and another one that saw the same walk did not, by their direction [rad]."""
@@ -130,6 +142,7 @@ class PointTriangles:
                 for there in directions
             )
             known.sort(key=_DIRECTION)
+            self._bare.pop((slot, other), None)
             self._lost[slot, other] = len(points), known
         return known
 

@@ -177,6 +177,7 @@ class SwarmProof:
                 self._followed[slot] = self._arcs_to_walls(slot)
                 self._spoil(slot)
         self._alone.clear()
+        self._triangles.forget_proved()
         for number in points:
             old, new = self._triangles.pairs(number), self._valid(number)
             if old != new:

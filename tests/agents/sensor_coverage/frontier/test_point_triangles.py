@@ -146,6 +146,26 @@ def test_a_point_of_another_walk_behind_a_triangle(
     assert found == (((0, 1), (1, 0)) if counts else ((1, 0),)), "the other slot may rely on the first one"
 
 
+def test_a_third_slot_is_asked_again_once_its_proof_has_changed() -> None:
+    views: Views = {0: {1: 0.0}, 1: {0: math.pi}}
+    point = WalkPoint({0: math.radians(60.0), 1: math.radians(120.0)}, (math.pi / 2.0,), ())
+    behind = WalkPoint({0: math.radians(40.0), 2: 0.5}, (math.pi / 2.0,), ())
+    proved: set[int] = set()
+    triangles = PointTriangles(lambda slot, there, other: slot in proved)
+    for number, each in enumerate((point, behind)):
+        for slot in each.seen:
+            triangles.add(slot, number, 0, 0, each)
+    at_walls = {(slot, side): True for slot in views for side in (1, -1)}
+    neighbours: dict[int, set[int]] = {0: {1}, 1: {0}}
+    found = []
+    for version in range(3):
+        found.append(triangles.find(0, point, views, neighbours, dict.fromkeys(views, version), at_walls))
+        if version == 1:
+            triangles.forget_proved()
+        proved.add(2)
+    assert found == [((1, 0),), ((1, 0),), ((0, 1), (1, 0))]
+
+
 @pytest.mark.parametrize(("error_rad", "counting"), [(0.0, {(0, 1), (1, 0)}), (-0.035, {(1, 0)})])
 def test_a_flat_triangle_that_noise_turns_over_does_not_count_at_its_middle(
     error_rad: float, counting: set[Pair]
