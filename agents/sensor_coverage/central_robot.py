@@ -161,7 +161,7 @@ class CentralRobot(Controller):
                 result.driven_m,
                 result.waypoints,
                 result.near,
-                self.motion.radius_m,
+                self.motion.walker,
                 self.wall_walk.start,
                 () if result.way is None else result.way.arcs_beside(),
             )

@@ -5,6 +5,8 @@ Directions are in the frame of the base.
 
 from msgspec import Struct
 
+from zwerm.agents.sensor_coverage.messages.commands import Walker
+
 
 class _WalkMessagePart(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """A part of a message."""
@@ -23,13 +25,13 @@ class WallEnd(_WalkMessagePart, frozen=True):
 
 
 class WallStretch(_WalkMessagePart, frozen=True):
-    """A stretch of wall that was followed: the numbers of its first and last points, its ends, and a body's radius [m]."""
+    """A stretch of wall that was followed: the numbers of its first and last points, its ends, and who followed it."""
 
     first_number: int
     last_number: int
     first: WallEnd
     last: WallEnd
-    radius_m: float
+    walker: Walker
 
 
 class _WalkMessage(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
