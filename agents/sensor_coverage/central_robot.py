@@ -87,6 +87,8 @@ class CentralRobot(Controller):
 
     def _advance(self) -> BodyVelocity:
         """Return the next velocity of the activity."""
+        if self._activity is None and self.motion.is_displaced() and not self.motion.frame.touched_robots:
+            self._activity = self._return()
         if self._activity is not None:
             try:
                 return next(self._activity)
@@ -95,11 +97,11 @@ class CentralRobot(Controller):
         return STOP
 
     def _wake(self, tick: int) -> Wake | None:
-        """Return the next wake-up: the next tick during an activity, else a packet or a component's wake-up."""
+        """Return the next wake-up: the next tick during an activity, else a packet, a contact or a component's wake-up."""
         if self._activity is not None:
             return None
         due = self.components.next_wake()
-        return Wake(at_s=None if due is None else max(tick + 1, due) * self.setup.dt_s, on_packet=True)
+        return Wake(at_s=None if due is None else max(tick + 1, due) * self.setup.dt_s, on_packet=True, on_contact=True)
 
     # --- commands -----------------------------------------------------------------------------------------------------
 
@@ -197,6 +199,14 @@ class CentralRobot(Controller):
         sightings = self._sightings() if fresh else None
         home = math.hypot(frame.x_m, frame.y_m) < HOME_M
         self.commands.answer(self._report(command.cycle, sightings, home))
+
+    def _return(self) -> Drive:
+        """Drive back to the point of rest, from which a passing robot has pushed this one away.
+
+        Others compare what they see of it with what its slot saw before.
+        """
+        if self.motion.rest is not None:
+            yield from self._return_to_rest(self.motion.rest)
 
     def _report(self, cycle: int, sightings: tuple[Sighting, ...] | None, home: bool) -> Report:
         return Report(cycle, sightings, self.motion.frame.touched, home, self.motion.frame.touched_robots)

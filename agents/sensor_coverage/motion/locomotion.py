@@ -91,6 +91,13 @@ class Locomotion:
                 return
             yield self.velocity(dx, dy)
 
+    def is_displaced(self) -> bool:
+        """Return whether another robot has pushed this one away from its point of rest."""
+        if self.rest is None:
+            return False
+        away_m = math.hypot(self.frame.x_m - self.rest[0], self.frame.y_m - self.rest[1])
+        return away_m > 2.0 * self.parameters.tolerance_m
+
     def return_to_rest(self, rest: Vector) -> Generator[BodyVelocity, None, Vector]:
         """Drive back to the point of rest if the robot was displaced; return the new point of rest, if a wall is there."""
         tolerance_m = self.parameters.tolerance_m

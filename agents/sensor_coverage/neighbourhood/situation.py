@@ -227,10 +227,7 @@ class Situation:
     @property
     def displaced(self) -> bool:
         """True if another robot has pushed this robot away from its point of rest."""
-        if self.motion.rest is None:
-            return False
-        away_m = math.hypot(self.motion.frame.x_m - self.motion.rest[0], self.motion.frame.y_m - self.motion.rest[1])
-        return away_m > 2.0 * self.motion.parameters.tolerance_m and not self.locked
+        return self.motion.is_displaced() and not self.locked
 
     @property
     def alone(self) -> bool:

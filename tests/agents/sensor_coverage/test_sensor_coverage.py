@@ -67,7 +67,7 @@ def test_a_robot_slides_along_a_wall_and_away_from_it() -> None:
 
 
 class OneRobot:
-    """One robot in a simulated plane: a neighbour that it sees within 1 m, and a wall across its path."""
+    """One robot in a simulated plane: a neighbour that it sees within 1 m and may touch, and a wall across its path."""
 
     def __init__(self, neighbour: tuple[float, float], wall_x_m: float) -> None:
         body = Body("holonomic", 0.07, 0.5, 6.0)
@@ -82,6 +82,8 @@ class OneRobot:
         dx, dy = self.neighbour[0] - self.x, self.neighbour[1] - self.y
         seen = (Bearing(7, math.atan2(dy, dx)),) if math.hypot(dx, dy) <= 1.0 else ()
         touch = (Contact(0.0, math.pi / 12.0),) if self.x >= self.wall_x_m - 0.075 else ()
+        if math.hypot(dx, dy) <= 0.145:
+            touch = (*touch, Contact(math.atan2(dy, dx), math.pi / 12.0))
         command = self.robot.step(
             Observation(
                 0,
@@ -155,6 +157,23 @@ def test_a_robot_that_a_wall_keeps_off_its_point_of_rest_reports_at_once_and_res
             alone.tick()
         assert [type(each) for each in alone.said] == [Report]
         assert alone.x == pytest.approx(arrived_m - 0.008, abs=1e-6)
+
+
+def test_a_robot_that_another_one_pushed_away_returns_once_that_has_left() -> None:
+    """What others see of it would not hold for its slot."""
+    alone = OneRobot((-0.9, 0.0), 9.0)
+    assert alone.until_arrived(Deploy(1, 0.0, 0.95, 0.8)).ok
+    rest_m = alone.x
+    alone.x, alone.moved = rest_m + 0.04, (0.04, 0.0)
+    alone.neighbour = alone.x - 0.14, 0.0
+    commands = [alone.tick() for _ in range(5)]
+    assert alone.x == rest_m + 0.04, "it does not push back"
+    assert commands[-1].wake is not None
+    assert commands[-1].wake.on_contact, "the end of the contact wakes it"
+    alone.neighbour = -0.9, 0.0
+    for _ in range(5):
+        alone.tick()
+    assert alone.x == pytest.approx(rest_m, abs=0.01)
 
 
 # --- the whole swarm ------------------------------------------------------------------------------------------------

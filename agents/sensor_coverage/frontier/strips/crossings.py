@@ -125,10 +125,12 @@ def _arc_between_walls(pocket: Pocket, other: Vector, error_rad: float = 0.0) ->
     """Yield the arc from the touched wall of a pocket to another touched point [m], if no opening fits in between.
 
     Each of the two points is known within half a switch, and the place of the slot's robot, if it touches the other one, within
-    the error of its bearing, a diameter away. This robot does not stand between the two.
+    the error of its bearing: it may be aside. This robot does not stand between the two.
     """
     arc = arc_between(direction_of(pocket.place, pocket.end.touched), direction_of(pocket.place, other))
-    apart_m = math.dist(pocket.end.touched, other)
-    known = math.sin(CONTACT_RAD) + math.sin(error_rad)
-    if apart_m <= 2.0 * (PASSABLE - known) * pocket.walker.radius_m and arc.width_rad <= math.pi / 2.0:
+    (x, y), (at_x, at_y) = other, pocket.end.at
+    aside_x, aside_y = (math.sin(error_rad) * each for each in (at_y - pocket.place[1], pocket.place[0] - at_x))
+    places = (x - aside_x, y - aside_y), (x + aside_x, y + aside_y)
+    apart_m = max(math.dist(pocket.end.touched, each) for each in places)
+    if apart_m <= 2.0 * (PASSABLE - math.sin(CONTACT_RAD)) * pocket.walker.radius_m and arc.width_rad <= math.pi / 2.0:
         yield arc

@@ -148,15 +148,18 @@ def test_between_two_contacts_that_no_opening_fits_between_all_is_closed() -> No
     assert closed_ranges(proof_of(walk, (0, 1), (-90.0,))) == [(-135, 1)]
 
 
-@pytest.mark.parametrize(("bearing_sd_deg", "apart_m", "closed"), [(0.0, 0.145, 2), (2.5, 0.145, 1), (2.5, 0.13, 2)])
-def test_two_contacts_are_closer_if_bearings_have_noise(bearing_sd_deg: float, apart_m: float, closed: int) -> None:
-    """The walking robot touches a wall in the south, and the robot beside it touches one in the south, too."""
+@pytest.mark.parametrize(
+    ("touched_deg", "contact_deg", "bearing_sd_deg", "closed"),
+    [(-90.0, -90.0, 0.0, 2), (-90.0, -90.0, 2.5, 2), (-120.0, 58.0, 0.0, 2), (-120.0, 58.0, 2.5, 1)],
+)
+def test_noise_of_a_bearing_moves_the_contact_of_a_robot_aside(
+    touched_deg: float, contact_deg: float, bearing_sd_deg: float, closed: int
+) -> None:
+    """Two contacts with one wall are as far apart as before; one before the robots and one behind them may be further."""
     at = 0.14, 0.0
-    end = StretchEnd(at, (0.14, -RADIUS_M))
-    walker = Walker(RADIUS_M, math.radians(bearing_sd_deg))
-    pocket = Pocket(end, end, walker, True, (0.0, 0.0), True)
-    contact_rad = -math.acos((0.14 - apart_m) / RADIUS_M)
-    assert len(list(arcs_beside_pocket(1, pocket, (contact_rad,)))) == closed
+    end = StretchEnd(at, touched_point(at, math.radians(touched_deg), RADIUS_M))
+    pocket = Pocket(end, end, Walker(RADIUS_M, math.radians(bearing_sd_deg)), True, (0.0, 0.0), True)
+    assert len(list(arcs_beside_pocket(1, pocket, (math.radians(contact_deg),)))) == closed
 
 
 def test_a_contact_on_the_other_side_of_a_robot_closes_nothing_between() -> None:
