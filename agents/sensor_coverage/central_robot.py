@@ -6,6 +6,7 @@ questions itself: its offset from the bearings that it must reach, contacts with
 
 import math
 from collections.abc import Collection, Generator, Sequence
+from contextlib import closing
 from typing import Final
 
 from zwerm.agents.runtime.contract import Controller, Setup
@@ -163,7 +164,7 @@ class CentralRobot(Controller):
                 result.driven_m,
                 result.waypoints,
                 result.near,
-                self.motion.walker,
+                self.motion.radius_m,
                 self.wall_walk.start,
                 () if result.way is None else result.way.arcs_beside(),
             )
@@ -201,12 +202,17 @@ class CentralRobot(Controller):
         self.commands.answer(self._report(command.cycle, sightings, home))
 
     def _return(self) -> Drive:
-        """Drive back to the point of rest, from which a passing robot has pushed this one away.
+        """Drive back to the point of rest, from which a passing robot has pushed this one away, until one is in touch again.
 
         Others compare what they see of it with what its slot saw before.
         """
-        if self.motion.rest is not None:
-            yield from self._return_to_rest(self.motion.rest)
+        if self.motion.rest is None:
+            return
+        with closing(self._return_to_rest(self.motion.rest)) as drive:
+            for velocity in drive:
+                if self.motion.frame.touched_robots:
+                    return
+                yield velocity
 
     def _report(self, cycle: int, sightings: tuple[Sighting, ...] | None, home: bool) -> Report:
         return Report(cycle, sightings, self.motion.frame.touched, home, self.motion.frame.touched_robots)

@@ -108,9 +108,10 @@ class NegotiatingRobot(CentralRobot):
 
     def _driving(self, drive: Generator[BodyVelocity, None, T]) -> Generator[BodyVelocity, None, T]:
         self._leave.driving = True
-        end = yield from drive
-        self._leave.driving = False
-        return end
+        try:
+            return (yield from drive)
+        finally:
+            self._leave.driving = False
 
 
 class NegotiatingBase(NegotiatingRobot, CentralBase):

@@ -165,7 +165,7 @@ class WallWalks:
         if len(walked.waypoints) > 1:
             origin = Origin(slot, walked.start)
             way = walked.waypoints
-            number = self._slots.take_walk(robot, hand, way, walked.walker, origin=origin, moving=moving)
+            number = self._slots.take_walk(robot, hand, way, walked.radius_m, origin=origin, moving=moving)
             self.idle = without_witnesses(self.idle, self._slots.walks[number].points)
 
     def axis(self, base: int) -> Routine[Sequence[float]]:
@@ -237,7 +237,7 @@ class WallWalks:
             there, stays = walked, walked.end in (LOST, MET)
             repeats = leads_again(way, walked.waypoints)
             way += walked.waypoints
-            number = slots.take_walk(leader, leg.hand, walked.waypoints, walked.walker, number, stays)
+            number = slots.take_walk(leader, leg.hand, walked.waypoints, walked.radius_m, number, stays)
             if stays:
                 self._measure(leader, origin, there, way)
                 return

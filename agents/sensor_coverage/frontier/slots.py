@@ -34,7 +34,7 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     tail,
     turned_vector,
 )
-from zwerm.agents.sensor_coverage.messages.commands import BODILESS, Sighting, Walker, Waypoint
+from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
 
 # Length [m] of a leg of a walk that the next leg repeats, so that the wall between them is one stretch.
 JOINED_M = 1.0
@@ -206,7 +206,7 @@ class Slots:
         robot: int,
         hand: int,
         waypoints: Iterable[Waypoint],
-        walker: Walker = BODILESS,
+        radius_m: float = 0.0,
         after: int | None = None,
         stays: bool = False,
         origin: Origin | None = None,
@@ -245,7 +245,9 @@ class Slots:
         if origin is not None:
             origin = Origin(origin.slot, turned_vector(origin.at, heading), self.occupant[origin.slot])
         before_it = () if after is None else tail(self.walks[after].points, JOINED_M)
-        self.walks.append(Walk(frame, hand, before_it + points, walker, slot_of.get(robot) if stays else None, origin))
+        self.walks.append(
+            Walk(frame, hand, before_it + points, radius_m, slot_of.get(robot) if stays else None, origin)
+        )
         return len(self.walks) - 1
 
     def note_near(self, slot: int, arcs: Sequence[NearArc]) -> None:

@@ -4,6 +4,7 @@ Every triangle of the proof has a standing robot i as a corner. Robot i sees the
 a point of a walk along a wall. Its sides are free lines of sight, or a step of the walk. So i sees the whole triangle.
 A robot is closed if such triangles fill the full turn around it. The robots at the ends of a triangle's side are
 responsible for the space beyond it. Beyond a step of a walk is a wall. An open arc is frontier until a robot went there.
+
 An obstacle that lies within one triangle, whose sides are at most r_v long, is not found.
 
 A triangle of two slots and a point of a walk counts only if the space beyond its sides is proved, too: two such triangles
@@ -17,7 +18,6 @@ import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
-from zwerm.agents.sensor_coverage.messages.commands import BODILESS, Walker
 from zwerm.maths.sums import added
 
 # An open arc narrower than this [rad] counts as closed: ends of arcs that join differ by less. An opening that a robot sees
@@ -157,14 +157,14 @@ class Origin(NamedTuple):
 class Walk(NamedTuple):
     """A stretch of wall that a robot followed, in the frame of one robot; `hand` is +1 if the wall was on the left.
 
-    `end` is the slot of the walking robot if it stands at the end of the walk. `origin` is the slot that it left, if all points
-    are close to that.
+    `radius_m` is the radius of its body. `end` is the slot of the walking robot if it stands at the end of the walk. `origin`
+    is the slot that it left, if all points are close to that.
     """
 
     frame: int
     hand: int
     points: tuple[WalkPoint, ...]
-    walker: Walker = BODILESS
+    radius_m: float = 0.0
     end: int | None = None
     origin: Origin | None = None
 

@@ -49,16 +49,6 @@ def turned_arcs(arcs: NearArcs, by: float) -> NearArcs:
     return tuple((start + by, width) for start, width in arcs)
 
 
-class Walker(NamedTuple):
-    """The radius [m] of the body of a robot that follows walls, and the standard deviation [rad] of its bearings."""
-
-    radius_m: float = 0.0
-    bearing_sd_rad: float = 0.0
-
-
-BODILESS: Final = Walker()
-
-
 class _UplinkPart(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """A part of a message."""
 
@@ -275,7 +265,7 @@ class Walked(_UplinkMessage, frozen=True, tag="walked"):
 
     (x, y) [m] is the way from the place where the robot stood before it drove to the wall, by odometry. `near` are
     the walls close to that place which the robot followed, `near_beside` has their arcs for a robot that stands a little beside
-    that place.
+    that place, and `radius_m` is that of its body.
     """
 
     cycle: int
@@ -285,7 +275,7 @@ class Walked(_UplinkMessage, frozen=True, tag="walked"):
     driven_m: float
     waypoints: tuple[Waypoint, ...]
     near: NearWalls = NearWalls()
-    walker: Walker = BODILESS
+    radius_m: float = 0.0
     start: tuple[float, float] = (0.0, 0.0)
     near_beside: NearArcs = ()
 

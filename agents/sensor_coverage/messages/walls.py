@@ -5,8 +5,6 @@ Directions are in the frame of the base.
 
 from msgspec import Struct
 
-from zwerm.agents.sensor_coverage.messages.commands import Walker
-
 
 class _WalkMessagePart(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """A part of a message."""
@@ -25,13 +23,13 @@ class WallEnd(_WalkMessagePart, frozen=True):
 
 
 class WallStretch(_WalkMessagePart, frozen=True):
-    """A stretch of wall that was followed: the numbers of its first and last points, its ends, and who followed it."""
+    """A stretch of wall that was followed: the numbers of its first and last points, its ends, and a body's radius [m]."""
 
     first_number: int
     last_number: int
     first: WallEnd
     last: WallEnd
-    walker: Walker
+    radius_m: float
 
 
 class _WalkMessage(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):

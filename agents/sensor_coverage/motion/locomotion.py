@@ -9,7 +9,6 @@ from collections.abc import Callable, Generator
 from typing import Final
 
 from zwerm.agents.runtime.contract import Setup
-from zwerm.agents.sensor_coverage.messages.commands import Walker
 from zwerm.agents.sensor_coverage.motion.homing import Vector, slide
 from zwerm.agents.sensor_coverage.motion.motion_parameters import RobotParameters
 from zwerm.agents.sensor_coverage.motion.odometry_frame import OdometryFrame
@@ -53,11 +52,6 @@ class Locomotion:
         if self.bearing_noise_rad is None:
             return int(self.parameters.first_samples)
         return int(self.parameters.samples) if self.bearing_noise_rad > EXACT_RAD else 1
-
-    @property
-    def walker(self) -> Walker:
-        """The robot's body and bearings, for others who judge by its walk."""
-        return Walker(self.radius_m, self.bearing_noise_rad or 0.0)
 
     def velocity(self, x_m: float, y_m: float) -> BodyVelocity:
         """Return the velocity that moves the robot by (x, y) [m] within one tick, or as far as its speed allows."""

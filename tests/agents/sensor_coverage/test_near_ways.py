@@ -12,7 +12,7 @@ from zwerm.agents.sensor_coverage.frontier.proofs.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import united_round
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, Origin, Walk, contains, turned_vector
-from zwerm.agents.sensor_coverage.messages.commands import Sighting, Walker, Waypoint
+from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
 from zwerm.agents.sensor_coverage.motion.walls.near_arcs import (
     NearPoint,
     NearWay,
@@ -113,7 +113,7 @@ def open_at_slot(
         seen = () if number > lost_after else (Sighting(1, math.atan2(other[1] - y, other[0] - x)),)
         back = start_in_sight(SLOT, [SLOT, *(at for at, _ in way[: number + 1])], -1, RADIUS_M)
         waypoints.append(Waypoint(x, y, seen, walls, (), back))
-    slots.take_walk(0, -1, waypoints, Walker(RADIUS_M), origin=None if origin is None else Origin(origin, SLOT))
+    slots.take_walk(0, -1, waypoints, RADIUS_M, origin=None if origin is None else Origin(origin, SLOT))
     proof = SwarmProof()
     proof.update(scan, slots.walks, {}, {0: near_arcs(way)}, {}, {0: robot_then, 1: 1})
     return proof.open_arcs().get(0, [])

@@ -59,9 +59,9 @@ class WalkOrigins:
         for number, point in enumerate(walk.points, first):
             self._origins[number] = walk.origin
             if slot in point.seen and point.walls:
-                walls = (touched_point(point.at, wall, walk.walker.radius_m) for wall in point.walls)
+                walls = (touched_point(point.at, wall, walk.radius_m) for wall in point.walls)
                 directions = tuple(direction_of(place, each) for each in walls)
-                distance_m, close_m = math.dist(place, point.at), 2.0 * BESIDE_DIAMETERS * walk.walker.radius_m
+                distance_m, close_m = math.dist(place, point.at), 2.0 * BESIDE_DIAMETERS * walk.radius_m
                 self._touched[number] = _Touched(slot, point, directions, distance_m, close_m)
 
     def beside(self, number: int, views: Views) -> tuple[Pair, ...]:

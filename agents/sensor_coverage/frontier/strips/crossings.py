@@ -36,8 +36,6 @@ from zwerm.agents.sensor_coverage.motion.homing import unit
 OVERHANG: Final = 1.0
 # An opening narrower than this many diameters of a body need not be found.
 PASSABLE: Final = 1.3
-# The bearing of a robot in touch is off by this many standard deviations at most.
-ERROR_SDS: Final = 2.0
 
 
 def crossings_of_step(
@@ -96,7 +94,7 @@ def arcs_beside_pocket(hand: int, pocket: Pocket, contacts: Iterable[float]) -> 
     No opening fits between a wall that the walking robot touched and a robot in touch with it, in front of the wall, nor
     between touched points that are close to each other.
     """
-    place, touched, radius_m = pocket.place, pocket.end.touched, pocket.walker.radius_m
+    place, touched, radius_m = pocket.place, pocket.end.touched, pocket.radius_m
     if pocket.in_touch and next(crossings_of_pocket(hand, pocket, False)).into > 0:
         wall = direction_of(pocket.end.at, touched)
         side = math.remainder(direction_of(pocket.end.at, place) - wall, math.tau)
@@ -104,9 +102,8 @@ def arcs_beside_pocket(hand: int, pocket: Pocket, contacts: Iterable[float]) -> 
         beyond = touched[0] + OVERHANG * radius_m * ux, touched[1] + OVERHANG * radius_m * uy
         if _is_in_front(pocket):
             yield arc_between(direction_of(place, touched), direction_of(place, beyond))
-        error_rad = min(ERROR_SDS * pocket.walker.bearing_sd_rad, math.pi / 2.0)
         for each in contacts:
-            yield from _arc_between_walls(pocket, touched_point(place, each, radius_m), error_rad)
+            yield from _arc_between_walls(pocket, touched_point(place, each, radius_m))
     if pocket.before is not None:
         yield from _arc_between_walls(pocket, pocket.before.touched)
 
@@ -121,16 +118,12 @@ def _is_in_front(pocket: Pocket) -> bool:
     return (x - wall_x) * (at_x - wall_x) + (y - wall_y) * (at_y - wall_y) > 0.0
 
 
-def _arc_between_walls(pocket: Pocket, other: Vector, error_rad: float = 0.0) -> Iterator[Arc]:
+def _arc_between_walls(pocket: Pocket, other: Vector) -> Iterator[Arc]:
     """Yield the arc from the touched wall of a pocket to another touched point [m], if no opening fits in between.
 
-    Each of the two points is known within half a switch, and the place of the slot's robot, if it touches the other one, within
-    the error of its bearing: it may be aside. This robot does not stand between the two.
+    Each of the two points is known within half a switch. The slot's robot does not stand between the two.
     """
     arc = arc_between(direction_of(pocket.place, pocket.end.touched), direction_of(pocket.place, other))
-    (x, y), (at_x, at_y) = other, pocket.end.at
-    aside_x, aside_y = (math.sin(error_rad) * each for each in (at_y - pocket.place[1], pocket.place[0] - at_x))
-    places = (x - aside_x, y - aside_y), (x + aside_x, y + aside_y)
-    apart_m = max(math.dist(pocket.end.touched, each) for each in places)
-    if apart_m <= 2.0 * (PASSABLE - math.sin(CONTACT_RAD)) * pocket.walker.radius_m and arc.width_rad <= math.pi / 2.0:
+    apart_m = math.dist(pocket.end.touched, other)
+    if apart_m <= 2.0 * (PASSABLE - math.sin(CONTACT_RAD)) * pocket.radius_m and arc.width_rad <= math.pi / 2.0:
         yield arc

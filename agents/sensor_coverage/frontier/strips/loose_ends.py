@@ -14,8 +14,6 @@ import math
 from collections.abc import Collection, Iterable, Sequence
 from typing import Final, NamedTuple
 
-from zwerm.agents.sensor_coverage.messages.commands import Walker
-
 Vector = tuple[float, float]
 
 # Bisections of a step.
@@ -44,7 +42,7 @@ class StretchEnd(NamedTuple):
 
 
 class Pocket(NamedTuple):
-    """An end of a stretch beside a standing robot at a place [m], the other end, and who walked.
+    """An end of a stretch beside a standing robot at a place [m], the other end, and a body's radius [m].
 
     `is_last` is true for the last point of the stretch. The walking robot touched the standing robot there if it is `in_touch`,
     else a few points away, without a wall in touch. `before` is the last end of the stretch before. `end_rad` is the direction
@@ -53,7 +51,7 @@ class Pocket(NamedTuple):
 
     end: StretchEnd
     other: StretchEnd
-    walker: Walker
+    radius_m: float
     is_last: bool
     place: Vector
     in_touch: bool
@@ -62,13 +60,13 @@ class Pocket(NamedTuple):
 
 
 class FollowedStretch(NamedTuple):
-    """A stretch of wall: the numbers of its first and last points of a walk, its ends, and who followed it."""
+    """A stretch of wall: the numbers of its first and last points of a walk, its ends, and the radius of a body [m]."""
 
     first_number: int
     last_number: int
     first: StretchEnd
     last: StretchEnd
-    walker: Walker
+    radius_m: float
 
     def tied_at_end(self, slot: int) -> "FollowedStretch":
         """Return the same stretch with one more slot that ties its last end."""

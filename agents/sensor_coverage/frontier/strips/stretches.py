@@ -14,7 +14,6 @@ from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import (
     end_of_stretch,
 )
 from zwerm.agents.sensor_coverage.frontier.wall_proof import BLIND_MAX, POCKET_RAD, TouchCounter, Walk, WalkPoint
-from zwerm.agents.sensor_coverage.messages.commands import BODILESS, Walker
 from zwerm.agents.sensor_coverage.motion.homing import unit
 
 
@@ -38,14 +37,14 @@ def pocket_of(
     if not (is_last or stretch.first_number - BLIND_MAX <= number <= stretch.first_number):
         return None
     ux, uy = unit(there_rad)
-    place = at[0] - 2.0 * stretch.walker.radius_m * ux, at[1] - 2.0 * stretch.walker.radius_m * uy
+    place = at[0] - 2.0 * stretch.radius_m * ux, at[1] - 2.0 * stretch.radius_m * uy
     in_touch = number in (stretch.first_number, stretch.last_number)
     end = stretch.last if is_last else stretch.first
     if angle_between(direction_of(place, end.at), direction_of(place, end.touched)) > POCKET_RAD:
         return None
     if is_last:
-        return Pocket(stretch.last, stretch.first, stretch.walker, True, place, in_touch, end_rad=ends_rad[1])
-    return Pocket(stretch.first, stretch.last, stretch.walker, False, place, in_touch, before, ends_rad[0])
+        return Pocket(stretch.last, stretch.first, stretch.radius_m, True, place, in_touch, end_rad=ends_rad[1])
+    return Pocket(stretch.first, stretch.last, stretch.radius_m, False, place, in_touch, before, ends_rad[0])
 
 
 def pockets_beside(
@@ -71,10 +70,10 @@ class StretchTracker:
     numbers of their first points.
     """
 
-    def __init__(self, hand: int, walker: Walker = BODILESS) -> None:
+    def __init__(self, hand: int, radius_m: float) -> None:
         self.latest: FollowedStretch | None = None
         self.found: dict[int, FollowedStretch] = {}
-        self._hand, self._walker = hand, walker
+        self._hand, self._radius_m = hand, radius_m
         self._touch = TouchCounter()
         self._since = -1
         self._met = False  # robots, since the latest wall
@@ -120,11 +119,11 @@ class StretchTracker:
         self._ties = self._ties[0], dict.fromkeys(robots)
         seen = tuple(seen)
         first_number, first_seen = (number, seen) if latest is None else (latest.first_number, latest.first.seen)
-        first = end_of_stretch(self._first, self._hand, self._walker.radius_m, False)
-        last = end_of_stretch(self._last, self._hand, self._walker.radius_m, True)
+        first = end_of_stretch(self._first, self._hand, self._radius_m, False)
+        last = end_of_stretch(self._last, self._hand, self._radius_m, True)
         first = first._replace(ties=tuple(self._ties[0]), seen=first_seen)
         last = last._replace(ties=tuple(self._ties[1]), seen=seen)
-        self._note(FollowedStretch(first_number, number, first, last, self._walker))
+        self._note(FollowedStretch(first_number, number, first, last, self._radius_m))
 
     def _note(self, stretch: FollowedStretch) -> None:
         self.latest = self.found[stretch.first_number] = stretch
@@ -132,7 +131,7 @@ class StretchTracker:
 
 def stretches_of(walk: Walk) -> dict[int, FollowedStretch]:
     """Return the stretch of wall of each point of a walk in touch with a wall. A stretch ends at standing robots."""
-    tracker = StretchTracker(walk.hand, walk.walker)
+    tracker = StretchTracker(walk.hand, walk.radius_m)
     first_numbers: dict[int, int] = {}
     for number, point in enumerate(walk.points):
         tracker.take(number, point.at, point.walls, point.robots, point.seen, point.at_body, point.left_walls)

@@ -11,17 +11,7 @@ from collections.abc import Callable, Collection, Generator, Iterable, Sequence
 from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.directions import angle_between
-from zwerm.agents.sensor_coverage.messages.commands import (
-    LOST,
-    MET,
-    OPEN,
-    SHUT,
-    STRETCH,
-    NearWalls,
-    Sighting,
-    Walker,
-    Waypoint,
-)
+from zwerm.agents.sensor_coverage.messages.commands import LOST, MET, OPEN, SHUT, STRETCH, NearWalls, Sighting, Waypoint
 from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
 from zwerm.agents.sensor_coverage.motion.locomotion import Locomotion
 from zwerm.agents.sensor_coverage.motion.walls.dead_bodies import DeadBodies, HeldPoints
@@ -91,9 +81,9 @@ class WallWalk:
         self._in_reach = RobotsInReach(motion.radius_m)
 
     @property
-    def walker(self) -> Walker:
-        """The robot's body and bearings."""
-        return self._motion.walker
+    def radius_m(self) -> float:
+        """The radius [m] of the robot's body."""
+        return self._motion.radius_m
 
     @property
     def start(self) -> Vector:
@@ -123,7 +113,7 @@ class WallWalk:
             end = SHUT
             yield from motion.drive_to(start)
         elif half_rad > 0.0:
-            edge = past_edge(lambda: motion.position, self._motion.radius_m, bearing_rad, hand, half_rad, start)
+            edge = past_edge(lambda: motion.position, self.radius_m, bearing_rad, hand, half_rad, start)
             yield from self._go_past(way, edge, EDGE_M_MAX)
         return self._end_near(way, end, done)
 
@@ -138,14 +128,14 @@ class WallWalk:
             yield from motion.drive_to(start)
             return WalkResult(OPEN, done)
         way = self._begin_near(hand)
-        edge = past_edge(lambda: motion.position, self._motion.radius_m, bearing_rad, hand, half_rad, start, CLEAR_M)
+        edge = past_edge(lambda: motion.position, self.radius_m, bearing_rad, hand, half_rad, start, CLEAR_M)
         end = STRETCH if (yield from self._go_past(way, edge, EDGE_M_MAX)) else SHUT
         yield from motion.drive_to(start)
         return self._end_near(way, end, done)
 
     def _begin_near(self, hand: int) -> NearWay:
         """Begin to record the way along a wall from here, close to the start, with the wall at the hand."""
-        way = self._way_near = NearWay(self._start, hand, self._motion.radius_m)
+        way = self._way_near = NearWay(self._start, hand, self.radius_m)
         self._near_points = self._held_points(way.waypoints.append)
         self._in_reach.begin()
         self._report(self._near_points)
@@ -357,7 +347,7 @@ class WallWalk:
                 for each in frame.contacts
                 if each.node is not None and each.node not in self._in_reach.out_of_reach
             ),
-            None if near is None else start_in_sight(self._start, self._trail, near.hand, self._motion.radius_m),
+            None if near is None else start_in_sight(self._start, self._trail, near.hand, self.radius_m),
         )
 
     # --- sight ------------------------------------------------------------------------------------------------------

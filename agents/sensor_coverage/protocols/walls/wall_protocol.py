@@ -23,7 +23,7 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     turned_vector,
 )
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
-from zwerm.agents.sensor_coverage.messages.commands import Walker, Waypoint
+from zwerm.agents.sensor_coverage.messages.commands import Waypoint
 from zwerm.agents.sensor_coverage.messages.peers import CHANNEL
 from zwerm.agents.sensor_coverage.messages.walls import (
     ArcClosed,
@@ -63,8 +63,8 @@ class StepReporter(Protocol):
     on_step: Callable[[Waypoint], None]
 
     @property
-    def walker(self) -> Walker:
-        """The robot's body and bearings."""
+    def radius_m(self) -> float:
+        """The radius [m] of the robot's body."""
 
 
 class WalkSituation(Protocol):
@@ -122,7 +122,7 @@ class WallProtocol(Component):
         self._push: int | None = None  # the push of this robot's own walk
         self._hand = 1
         self._number = 0
-        self._stretches, self._sightlines = StretchTracker(1), Sightlines()
+        self._stretches, self._sightlines = StretchTracker(1, 0.0), Sightlines()
         self._closed = False
         self._received: dict[int, _Received] = {}
         self._kept = KeptPoints()
@@ -138,7 +138,7 @@ class WallProtocol(Component):
         """Announce the points of the walk that begins now."""
         if push != self._push:
             self._push, self._hand, self._number = push, hand, 0
-            self._stretches = StretchTracker(hand, self._situation.wall_walk.walker)
+            self._stretches = StretchTracker(hand, self._situation.wall_walk.radius_m)
             self._sightlines = Sightlines()
             self._latest = None
             self._situation.said_dead.clear()

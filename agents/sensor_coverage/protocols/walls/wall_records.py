@@ -10,7 +10,7 @@ from zwerm.agents.sensor_coverage.messages.walls import NeighbourProved, WallEnd
 def message_of(stretch: FollowedStretch) -> WallStretch:
     """Return the message of a stretch whose ends name robots."""
     first, last = (WallEnd(*each) for each in (stretch.first, stretch.last))
-    return WallStretch(stretch.first_number, stretch.last_number, first, last, stretch.walker)
+    return WallStretch(stretch.first_number, stretch.last_number, first, last, stretch.radius_m)
 
 
 def stretch_of(message: WallStretch, slots: Mapping[int, int]) -> FollowedStretch:
@@ -24,7 +24,7 @@ def stretch_of(message: WallStretch, slots: Mapping[int, int]) -> FollowedStretc
         )
         for each in (message.first, message.last)
     )
-    return FollowedStretch(message.first_number, message.last_number, first, last, message.walker)
+    return FollowedStretch(message.first_number, message.last_number, first, last, message.radius_m)
 
 
 def proved_arc(message: NeighbourProved) -> ProvedArc:

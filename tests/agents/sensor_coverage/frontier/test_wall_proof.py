@@ -425,7 +425,7 @@ def pass_walk(proof: SlotProof, points: Iterable[WalkPoint], hand: int) -> list[
     """Let a walk pass a slot; return after which points the open arcs are smaller."""
     steps: list[WallStep] = []
     smaller = []
-    tracker = StretchTracker(hand)
+    tracker = StretchTracker(hand, 0.0)
     for number, point in enumerate(points):
         tracker.take(number, point.at, point.walls, point.robots, point.seen)
         last = steps[-1] if steps else None
@@ -488,7 +488,7 @@ def test_two_points_of_walks_beside_a_door_close_nothing_at_a_slot() -> None:
 def test_an_arc_behind_a_corner_stays_closed_while_the_robot_that_saw_the_way_stands() -> None:
     proof = at_slot(0, PAIR)
     before, point = (WalkPoint({0: math.radians(each)}, SOUTH, ()) for each in (-90.0, -70.0))
-    tracker = StretchTracker(-1)
+    tracker = StretchTracker(-1, 0.0)
     for number in (0, 1):
         tracker.take(number, before.at, SOUTH, (), (0,))
     assert proof.pass_step(1, None, WallStep(before, point, -1, (1,)), tracker.latest)

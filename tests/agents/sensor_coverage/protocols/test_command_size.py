@@ -7,7 +7,7 @@ import pytest
 from zwerm.agents.sensor_coverage.frontier.proofs.slot_proof import SlotProof
 from zwerm.agents.sensor_coverage.local_node import CODECS
 from zwerm.agents.sensor_coverage.messages.beacons import StateRequest
-from zwerm.agents.sensor_coverage.messages.commands import NearWalls, Response, Sighting, Walked, Walker, Waypoint
+from zwerm.agents.sensor_coverage.messages.commands import NearWalls, Response, Sighting, Walked, Waypoint
 from zwerm.agents.sensor_coverage.messages.commands import write as write_command
 from zwerm.agents.sensor_coverage.messages.peers import CHANNEL, read_envelope, write
 from zwerm.agents.sensor_coverage.messages.pushes import LeaderReady, ProvedArc, Segment, SlotMemory, WalkTriangle
@@ -75,7 +75,7 @@ def test_the_waypoints_of_the_longest_leg_fit_into_a_command() -> None:
         bytes_each = WAYPOINT_BYTES + robots * SIGHTING_BYTES
         leg = (point,) * (1 + LEG_BYTES_MAX // bytes_each)
         near = NearWalls(((math.pi, math.pi),) * 150, ((math.pi, math.pi),) * 50)
-        walked = Walked(SLOT, "stretch", math.pi, math.pi, math.pi, leg, near, Walker(math.pi, math.pi))
+        walked = Walked(SLOT, "stretch", math.pi, math.pi, math.pi, leg, near, math.pi)
         assert len(write_command(Response(SLOT, SLOT, SLOT, SLOT, SLOT, walked))) < MESSAGE_BYTES_MAX - 5_000
 
 

@@ -10,7 +10,7 @@ from zwerm.agents.sensor_coverage.frontier.strips.stretches import StretchTracke
 from zwerm.agents.sensor_coverage.frontier.wall_proof import mark_of
 from zwerm.agents.sensor_coverage.local_node import MAKERS
 from zwerm.agents.sensor_coverage.messages.beacons import NO_PATH_VECTOR, SeenRobot, StateBeacon
-from zwerm.agents.sensor_coverage.messages.commands import BODILESS, Waypoint
+from zwerm.agents.sensor_coverage.messages.commands import Waypoint
 from zwerm.agents.sensor_coverage.messages.pushes import ProvedArc
 from zwerm.agents.sensor_coverage.messages.walls import ArcClosed, DeadInSight, NeighbourProved, PassedPoint
 from zwerm.agents.sensor_coverage.neighbourhood.local_map import LocalMap
@@ -38,7 +38,7 @@ class Here:
 
     on_step: Callable[[Waypoint], None] = staticmethod(lambda _: None)
     node = ME
-    walker = BODILESS
+    radius_m = 0.0
 
     def __init__(self) -> None:
         self.local_map = LocalMap(ME, PlannerParameters(walls="followed"), MAKERS)
@@ -49,7 +49,7 @@ class Here:
         self.dead, self.said_dead = dict[int, None](), dict[int, None]()
         self.told_dead: tuple[int, ...] = ()
         self.walls = WallProtocol(self)
-        self.walk = StretchTracker(-1, self.walker)
+        self.walk = StretchTracker(-1, self.radius_m)
         self.sees = dict[int, float]()
 
     @property

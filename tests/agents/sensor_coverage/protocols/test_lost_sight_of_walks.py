@@ -56,7 +56,7 @@ def follow(
     """
     last: WallStep | None = None
     smaller = False
-    tracker = tracker or StretchTracker(-1)
+    tracker = tracker or StretchTracker(-1, 0.0)
     for number, each in enumerate(directions_deg, first):
         point = WalkPoint({7: math.radians(each), SEER: 0.0}, (math.radians(each),), ())
         tracker.take(number, point.at, point.walls, (), (7, SEER))
@@ -189,7 +189,7 @@ def test_an_edge_is_open_only_where_the_walk_did_not_pass_in_sight(over: bool, p
     """The robot goes round an obstacle twice, and stops in front of slot 7. Then it leaves."""
     proof = SlotProof()
     look(proof)
-    tracker, number = StretchTracker(-1), 0
+    tracker, number = StretchTracker(-1, 0.0), 0
     for each_round in [(150, 200, 250, 318, 330) if passes_in_sight else (250, 318, 330), (150, 200, 250)]:
         follow(proof, WALK, each_round, tracker=tracker, first=number + 1)
         number += len(each_round)

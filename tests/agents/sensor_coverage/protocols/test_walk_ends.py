@@ -9,7 +9,6 @@ from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.frontier.proofs.slot_proof import SlotProof
 from zwerm.agents.sensor_coverage.frontier.strips.stretches import StretchTracker
 from zwerm.agents.sensor_coverage.frontier.wall_proof import WalkPoint, WallStep
-from zwerm.agents.sensor_coverage.messages.commands import Walker
 from zwerm.maths.simplicial import FlagComplex
 
 RADIUS_M = 0.07
@@ -34,7 +33,7 @@ def view(proof: SlotProof, *standing: int) -> None:
 
 def walk(points: Sequence[WalkPoint], *standing: int) -> tuple[SlotProof, StretchTracker]:
     """Return the proof of slot 0 after a walk, and the walking robot's stretches."""
-    proof, tracker = SlotProof(), StretchTracker(-1, Walker(RADIUS_M))
+    proof, tracker = SlotProof(), StretchTracker(-1, RADIUS_M)
     view(proof, *standing)
     last: WallStep | None = None
     for number, each in enumerate(points):
