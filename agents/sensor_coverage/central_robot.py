@@ -88,7 +88,7 @@ class CentralRobot(Controller):
 
     def _advance(self) -> BodyVelocity:
         """Return the next velocity of the activity."""
-        if self._activity is None and self.motion.is_displaced() and not self.motion.frame.touched_robots:
+        if self._activity is None and self.motion.is_displaced():
             self._activity = self._return()
         if self._activity is not None:
             try:
@@ -202,7 +202,7 @@ class CentralRobot(Controller):
         self.commands.answer(self._report(command.cycle, sightings, home))
 
     def _return(self) -> Drive:
-        """Drive back to the point of rest, from which a passing robot has pushed this one away, until one is in touch again.
+        """Drive back to the point of rest, from which a passing robot has pushed this one away, while none is in touch.
 
         Others compare what they see of it with what its slot saw before.
         """
