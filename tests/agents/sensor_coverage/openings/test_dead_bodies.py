@@ -1,6 +1,7 @@
 """A robot dies in an opening, and beyond it is space: `completed` must not be said while that is unseen."""
 
 import pytest
+from halls import UntilInSight
 
 from benchmarks.common.small_buildings import CrashInOpening
 from zwerm.run.runner import run
@@ -51,6 +52,7 @@ ALONE = ("services.path=gradient",)
     ],
 )
 def test_a_dead_body_in_an_opening_hides_no_room(settings: tuple[str, ...]) -> None:
-    result = run("sensor-coverage-narrow", 1, "inline", (*settings, "time.duration_s=4000.0"))
+    settings = (*settings, "time.duration_s=4000.0")
+    result = run("sensor-coverage-narrow", 1, "inline", settings, watcher=UntilInSight())
     assert result.metrics["faults_missed"] == 0.0
     assert result.outcome != "completed" or result.metrics["reachable_coverage_fraction"] >= 0.98

@@ -1,7 +1,7 @@
 """Drawn buildings in which a narrow opening was passed by: `completed` must not be said while the space behind it is unseen."""
 
 import pytest
-from halls import EXACT, NOISE, carry_out
+from halls import EXACT, NOISE, UntilInSight, carry_out
 
 
 @pytest.mark.parametrize(
@@ -24,7 +24,7 @@ from halls import EXACT, NOISE, carry_out
     ],
 )
 def test_a_narrow_opening_is_not_passed_by(seed: int, dies: bool, more: tuple[str, ...]) -> None:
-    result = carry_out(seed, dies, more)
+    result = carry_out(seed, dies, more, UntilInSight())
     assert result.outcome != "completed" or result.metrics["reachable_coverage_fraction"] >= 0.98
 
 

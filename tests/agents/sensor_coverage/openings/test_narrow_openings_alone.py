@@ -1,7 +1,7 @@
 """Without a coordinator, `completed` must not be said either while the space behind a narrow opening is unseen."""
 
 import pytest
-from halls import EXACT, NOISE, carry_out
+from halls import EXACT, NOISE, UntilInSight, carry_out
 
 ALONE = (EXACT, "services.path=gradient")
 WITNESS = ("services.path=gradient", "time.duration_s=600.0")
@@ -24,5 +24,5 @@ WITNESS = ("services.path=gradient", "time.duration_s=600.0")
     ],
 )
 def test_robots_alone_pass_by_no_narrow_opening(seed: int, dies: bool, more: tuple[str, ...]) -> None:
-    result = carry_out(seed, dies, more)
+    result = carry_out(seed, dies, more, UntilInSight())
     assert result.outcome != "completed" or result.metrics["reachable_coverage_fraction"] >= 0.98
