@@ -1,7 +1,7 @@
 """Triangles of two slots and a point of a walk, in which the two slots see the point and each other."""
 
 import math
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.wall_proof import WalkPoint
@@ -22,15 +22,17 @@ def fan_of(
     neighbours: Mapping[int, Collection[int]],
     at_walls: Beyond,
     without: Collection[Pair] = (),
+    is_hidden: Callable[[Pair], bool] | None = None,
 ) -> tuple[Pair, ...]:
     """Return (slot, other slot) for each triangle with a point that counts at the slot: the space beyond it is proved at both.
 
     Beyond the line of sight from a slot to the point there must be a wall that was followed (`at_walls`), or another such
     triangle with the same point, or a triangle of robots that contains the point. A wall in touch with a slot counts here
     in the direction of the contact only: two robots may touch the ends of walls on both sides of a door. A triangle in
-    `without` does not count at its first slot. Without these all count at both. A flat triangle that may lie on either side
-    of its middle slot does not count there. Where bearings have noise, the two slots may see a triangle on different sides of
-    its side between them. Then the space beyond must be proved on both sides at the slot with the flatter angle.
+    `without` does not count at its first slot, nor does one that `is_hidden`. Without these all count at both. A flat
+    triangle that may lie on either side of its middle slot does not count there. Where bearings have noise, the two slots may
+    see a triangle on different sides of its side between them. Then the space beyond must be proved on both sides at the slot
+    with the flatter angle.
     """
     seen = [slot for slot in point.seen if slot in neighbours]
     pairs = [(a, b) for a in seen for b in seen if b in neighbours[a] and (a, b) not in without]
@@ -57,7 +59,11 @@ def fan_of(
         if len(kept) == len(pairs):
             # A triangle that is flat at a slot, and on different sides of the point by the two slots' bearings, may by noise be
             # on the other side of the slot: it would rely on the other one for a space that lies on its own side.
-            return tuple((a, b) for a, b in kept if sides[a, b] != sides[b, a] or not _is_flat(point, a, views[a][b]))
+            found = tuple((a, b) for a, b in kept if sides[a, b] != sides[b, a] or not _is_flat(point, a, views[a][b]))
+            hidden = () if is_hidden is None else dict.fromkeys(each for each in found if is_hidden(each))
+            if not hidden:
+                return found
+            kept, is_hidden = [each for each in kept if each not in hidden], None  # the others were judged
         pairs = kept
 
 
@@ -84,17 +90,28 @@ def _is_inside(
     neighbours: Mapping[int, Collection[int]],
 ) -> bool:
     """Return whether a triangle of this slot and two others contains a point. One of these sees the point."""
-    return any(
-        is_between(point.seen[slot], views[slot][a], views[slot][b], INSIDE_RAD)
-        and is_between(point.seen[a], views[a][slot], views[a][b], INSIDE_RAD)
-        for a in seen
-        if a in neighbours[slot]
-        for b in neighbours[slot]
-        if b in neighbours[a]
-    )
+    here, around = views[slot], neighbours[slot]
+    offs = {each: math.remainder(here[each] - point.seen[slot], math.tau) for each in around}
+    aside = [(each, off) for each, off in offs.items() if abs(off) > INSIDE_RAD]
+    for a in seen:
+        left = offs.get(a, 0.0)
+        if abs(left) <= INSIDE_RAD:
+            continue
+        for b, right in aside:
+            if (
+                left * right < 0.0
+                and abs(left) + abs(right) < math.pi
+                and b in neighbours[a]
+                and is_between(point.seen[a], views[a][slot], views[a][b], INSIDE_RAD)
+            ):
+                return True
+    return False
 
 
 def is_between(there: float, a: float, b: float, margin_rad: float = 0.0) -> bool:
     """Return whether a direction [rad] lies within the smaller angle between two others, farther from both than a margin."""
-    left, right = math.remainder(a - there, math.tau), math.remainder(b - there, math.tau)
-    return left * right < 0.0 and abs(left) + abs(right) < math.pi and min(abs(left), abs(right)) > margin_rad
+    left = math.remainder(a - there, math.tau)
+    if abs(left) <= margin_rad:
+        return False
+    right = math.remainder(b - there, math.tau)
+    return left * right < 0.0 and abs(left) + abs(right) < math.pi and abs(right) > margin_rad

@@ -126,8 +126,9 @@ class WalkPoint(NamedTuple):
         )
 
     def unseen_by(self, slots: Collection[int]) -> "WalkPoint":
-        """Return the same point as if these slots had not seen it."""
-        return self._replace(seen={slot: there for slot, there in self.seen.items() if slot not in slots})
+        """Return the same point as if these slots had not seen it, itself if they have not."""
+        seen = {slot: there for slot, there in self.seen.items() if slot not in slots}
+        return self if len(seen) == len(self.seen) else self._replace(seen=seen)
 
 
 class WallStep(NamedTuple):
@@ -396,5 +397,4 @@ def complement(arcs: Iterable[Arc]) -> list[Arc]:
 
 def ends_at(arcs: Iterable[Arc], there: float, side: int) -> bool:
     """Return whether one of these arcs contains the directions on one side of a direction [rad]."""
-    beside = there + side * BESIDE_RAD
-    return any((beside - start) % math.tau < width for start, width in arcs)
+    return any((there + side * BESIDE_RAD - start) % math.tau < width for start, width in arcs)

@@ -33,6 +33,11 @@ class PointTriangles:
 
     def __init__(self, is_proved: Callable[[int, float, int], bool]) -> None:
         self._is_proved = is_proved
+        self._basis: dict[int, tuple[object, object, object]] = {}
+        self._pairs: dict[int, tuple[Pair, ...]] = {}
+        self._forget()
+
+    def _forget(self) -> None:
         self._stretch_of: dict[int, int] = {}  # the number of the first point of the stretch, by the number of a point
         self._seers: dict[int, dict[int, None]] = {}  # the slots that saw a walk, by the number of its first point
         # The points that a slot saw, each with its walk and its directions [rad].
@@ -42,8 +47,12 @@ class PointTriangles:
         self._lost: dict[tuple[int, int], tuple[int, list[_Lost]]] = {}
         # Whether no other slot that saw a lost point is proved, by its number among them, until the proof of a slot changes.
         self._bare: dict[Pair, dict[int, bool]] = {}
-        self._basis: dict[int, tuple[object, object, object]] = {}
-        self._pairs: dict[int, tuple[Pair, ...]] = {}
+
+    def begin_again(self, same: Collection[int]) -> None:
+        """Forget all points, but not which triangles count with those that are the `same`: all are added again."""
+        self._forget()
+        self._basis = {number: each for number, each in self._basis.items() if number in same}
+        self._pairs = {number: each for number, each in self._pairs.items() if number in same}
 
     def add(self, slot: int, number: int, stretch: int, walk: int, point: WalkPoint) -> None:
         """Add a point of a walk that a slot saw; `stretch` and `walk` are the numbers of their first points."""
@@ -96,16 +105,15 @@ class PointTriangles:
         ):
             return self._pairs[number]
         self._basis[number] = basis
-        hidden = dict.fromkeys(close)
-        while True:
-            pairs = fan_of(point, views, neighbours, at_walls, hidden)
-            more = [
-                each for each in pairs if self._hides(each, point, views) or _crosses(each, point, views, neighbours)
-            ]
-            if not more:
-                self._pairs[number] = pairs
-                return pairs
-            hidden |= dict.fromkeys(more)
+        pairs = self._pairs[number] = fan_of(
+            point,
+            views,
+            neighbours,
+            at_walls,
+            close,
+            lambda each: self._hides(each, point, views) or _crosses(each, point, views, neighbours),
+        )
+        return pairs
 
     def _hides(self, pair: Pair, point: WalkPoint, views: Views) -> bool:
         """Return whether the second slot lost sight of a walk within the angle at the first of their triangle with a point.
@@ -155,9 +163,10 @@ def _crosses(pair: Pair, point: WalkPoint, views: Views, neighbours: Mapping[int
     """
     slot, other = pair
     here, there = views[slot], views[other]
+    beyond, to_other, to_point = neighbours[other], here[other], point.seen[slot]
     return any(
-        is_between(here[third], here[other], point.seen[slot], HIDDEN_MIN_RAD)
+        third in beyond
+        and is_between(here[third], to_other, to_point, HIDDEN_MIN_RAD)
         and is_between(point.seen[other], there[slot], there[third], HIDDEN_MIN_RAD)
         for third in neighbours[slot]
-        if third in neighbours[other]
     )

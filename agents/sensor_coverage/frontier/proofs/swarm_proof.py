@@ -74,6 +74,9 @@ class SwarmProof:
         self._passed: dict[int, list[Passed]] = {}
         self._witnessed: dict[int, dict[int, None]] = {}  # slots that rely on points which this slot saw
         self._gone: dict[int, None] = {}  # slots that stood in an earlier scan
+        self._views: dict[int, Mapping[int, float]] = {}  # the directions [rad] of the neighbours, by slot
+        self._versions: dict[int, int] = {}  # changes of what a slot sees
+        self._triangles = PointTriangles(self._is_proved)
         self._forget()
 
     def _forget(self) -> None:
@@ -84,8 +87,6 @@ class SwarmProof:
         self._followed: dict[int, list[Arc]] = {}  # arcs that end at followed walls or at contacts, by slot
         self._by_stretch: dict[int, dict[int, list[Arc]]] = {}  # of them those of one stretch, by slot and stretch
         self._edged: dict[int, list[Arc]] = {}  # the same arcs as `_followed` without edges of sight
-        self._versions: dict[int, int] = {}  # changes of what a slot sees
-        self._triangles = PointTriangles(self._is_proved)
         self._chosen: dict[Pair, dict[int, int]] = {}  # the numbers of the points of triangles beside an edge, by side
         self._open_arcs: dict[int, list[Arc]] = {}
         self._alone: dict[Pair, list[Arc]] = {}  # what is closed at the first slot without the second
@@ -115,17 +116,17 @@ class SwarmProof:
         self._gone = {slot: None for slot in (*self._gone, *gone) if slot not in back}
         self._neighbours = {slot: frozenset(each) for slot, each in complex_.neighbours.items()}
         changed: dict[int, None] = {}
+        seen, self._views = self._views, {}
         for slot in complex_.vertices:
             view = scan.views[slot]
-            beside = {each: view[each] for each in complex_.neighbours[slot]}
+            beside = self._views[slot] = {each: view[each] for each in complex_.neighbours[slot]}
+            if seen.get(slot) != beside:
+                self._versions[slot] = self._versions.get(slot, 0) + 1
             robots = [each for each in in_touch.get(slot, ()) if each in beside]
             passed = len(self._passed.get(slot, ()))
             robot = self._robots.get(slot)
             now = ArcBasis(passed, beside, touched.get(slot, ()), tuple(near.get(slot, ())), robots, robot)
-            known = self._around.get(slot)
-            if known != now:
-                if known is None or known.view != now.view:
-                    self._versions[slot] = self._versions.get(slot, 0) + 1
+            if self._around.get(slot) != now:
                 self._around[slot] = now
                 changed[slot] = None
         left = dict.fromkeys(
@@ -142,10 +143,13 @@ class SwarmProof:
     # --- what has changed -------------------------------------------------------------------------------------------
 
     def _index(self, walks: Sequence[Walk]) -> None:
-        """Find the slots that saw each point of the walks that are new. Another list: all have other directions."""
+        """Find the slots that saw each point of the walks that are new. Another list: some have others."""
         if walks is not self._walks:
+            points = [each for walk in walks for each in walk.points]
+            same = {number for number, (a, b) in enumerate(zip(self._points, points, strict=False)) if a is b}
             self._walks, self._count = walks, 0
             self._points, self._passed, self._witnessed, self._origins = [], {}, {}, WalkOrigins()
+            self._triangles.begin_again(same)
             self._forget()
         for walk in walks[self._count :]:
             for slot, passed in passes(walk, len(self._points)):
@@ -209,7 +213,7 @@ class SwarmProof:
 
     def _open_without(self, slot: int, pair: Pair | None, side: int) -> list[Arc]:
         """Return the arcs of a slot that are open without the triangle on one side of an edge."""
-        view, fans = self._scan.views[slot], list[Arc]()
+        view, fans = self._views[slot], list[Arc]()
         for other in self._neighbours[slot]:
             its_pair = _pair_of(slot, other)
             numbers = self._choose(its_pair)
@@ -228,13 +232,13 @@ class SwarmProof:
 
     def _closed_by_robots(self, slot: int) -> list[Arc]:
         """Return the arcs of a slot that triangles of robots and robots in touch close."""
-        view, around = self._scan.views[slot], self._around[slot]
+        view, around = self._views[slot], self._around[slot]
         bodies = arcs_of_robots([view[each] for each in around.in_touch], around.touched)
         return [*bodies, *self._arcs_between(slot)]
 
     def _arcs_between(self, slot: int, without: int | None = None) -> Iterator[Arc]:
         """Yield the arcs of a slot in its triangles of robots, but those with one of its neighbours."""
-        view, beside = self._scan.views[slot], self._neighbours[slot] - {without}
+        view, beside = self._views[slot], self._neighbours[slot] - {without}
         yield from (arc_between(view[a], view[b]) for a in beside for b in beside & self._neighbours[a] if a < b)
 
     def _choose(self, pair: Pair) -> dict[int, int]:
@@ -252,7 +256,7 @@ class SwarmProof:
     def _candidates(self, pair: Pair) -> dict[int, list[int]]:
         """Return the numbers of the points of the triangles with an edge that count at one of its ends, by side."""
         found: dict[int, list[int]] = {}
-        there = self._scan.views[pair[0]][pair[1]]
+        there = self._views[pair[0]][pair[1]]
         for each in self._passed.get(pair[0], ()):
             counting = self._triangles.pairs(each.number)
             if pair in counting or pair[::-1] in counting:
@@ -265,7 +269,7 @@ class SwarmProof:
         for number in numbers:
             counting, seen = self._triangles.pairs(number), self._points[number].seen
             arcs = [
-                (slot, arc_between(self._scan.views[slot][other], seen[slot]))
+                (slot, arc_between(self._views[slot][other], seen[slot]))
                 for slot, other in (pair, pair[::-1])
                 if (slot, other) in counting
             ]
@@ -337,7 +341,7 @@ class SwarmProof:
             return ()
         standing = [slot for slot in point.seen if slot in self._neighbours]
         at_walls = {(slot, side): self._ends_beyond(slot, number, side) for slot in standing for side in (1, -1)}
-        views, origins = self._scan.views, self._origins
+        views, origins = self._views, self._origins
         beside = origins.beside(number, views)
         return self._triangles.find(number, point, views, self._neighbours, self._versions, at_walls, beside)
 

@@ -98,6 +98,31 @@ def test_a_point_keeps_its_pairs_until_a_view_or_a_wall_changes() -> None:
     assert triangles.pairs(number) == ()
 
 
+def test_points_that_are_added_again_have_the_pairs_of_a_search() -> None:
+    """A slot is displaced: it has seen no point of the second half. The other points keep their pairs."""
+    points, views, neighbours = drawn(1)
+    versions, half = dict.fromkeys(views, 1), POINTS // 2
+    triangles = added(points)
+
+    def find(number: int, point: WalkPoint) -> tuple[Pair, ...]:
+        at_walls = {(slot, side): True for slot in point.seen for side in (1, -1)}
+        return triangles.find(number, point, views, neighbours, versions, at_walls)
+
+    before = [find(*each) for each in enumerate(points)]
+    others = [*points[:half], *(each.unseen_by((0,)) for each in points[half:])]
+    same = [number for number, (a, b) in enumerate(zip(points, others, strict=True)) if a is b]
+    assert half < len(same) < POINTS
+    triangles.begin_again(same)
+    assert [triangles.pairs(number) for number in same] == [before[number] for number in same]
+    assert not any(triangles.pairs(number) for number in range(POINTS) if number not in same)
+    for number, point in enumerate(others):
+        for slot in point.seen:
+            triangles.add(slot, number, 0, 0, point)
+    after = [find(*each) for each in enumerate(others)]
+    assert [set(each) for each in after] == [searched(each, others, views, neighbours) for each in others]
+    assert after != before
+
+
 def test_a_later_point_of_the_same_stretch_counts() -> None:
     points, views, neighbours = drawn(2)
     versions, half = dict.fromkeys(views, 1), POINTS // 2
