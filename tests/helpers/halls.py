@@ -38,7 +38,7 @@ def drive(
 
 
 class UntilInSight(NullProgress):
-    """Interrupts a run once its robots have seen nearly all of the arena for a minute: then `completed` is no false word.
+    """Interrupts a run once its robots have seen nearly all of the arena for half a minute: then `completed` is no false word.
 
     It is for tests in which a run may not end before. The campaigns of `benchmarks/algorithms` judge whole runs.
     """
@@ -49,7 +49,7 @@ class UntilInSight(NullProgress):
     def covered(self, fraction: float, robots: int) -> None:
         """Count the samples in a row, one every 5 s, with all but 2 % of the arena in sight."""
         self._samples = self._samples + 1 if fraction >= 0.98 else 0
-        if self._samples > 12:
+        if self._samples > 6:
             raise KeyboardInterrupt
 
 
