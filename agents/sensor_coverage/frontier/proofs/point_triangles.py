@@ -49,7 +49,7 @@ class PointTriangles:
         self._bare: dict[Pair, dict[int, bool]] = {}
 
     def begin_again(self, same: Collection[int]) -> None:
-        """Forget all points, but not which triangles count with those that are the `same`: all are added again."""
+        """Forget all points, which are added again, but for the triangles that count with the points `same`."""
         self._forget()
         self._basis = {number: each for number, each in self._basis.items() if number in same}
         self._pairs = {number: each for number, each in self._pairs.items() if number in same}

@@ -45,7 +45,6 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     overlap,
     united,
 )
-from zwerm.maths.simplicial import FlagComplex
 from zwerm.maths.sums import added
 
 # A triangle closes more than another one only if the difference is larger than this [rad].
@@ -80,7 +79,7 @@ class SwarmProof:
         self._forget()
 
     def _forget(self) -> None:
-        self._scan = ScanResult({}, FlagComplex({}), ())
+        self._bases: Collection[int] = ()
         self._robots: dict[int, int] = {}  # at slots at which walks have begun
         self._neighbours: dict[int, frozenset[int]] = {}
         self._around: dict[int, ArcBasis] = {}
@@ -109,7 +108,7 @@ class SwarmProof:
         """
         before = self._neighbours
         self._index(walks)
-        self._scan, self._robots = scan, self._origins.robots_at(occupants)
+        self._bases, self._robots = scan.bases, self._origins.robots_at(occupants)
         complex_ = scan.complex_
         gone = [slot for slot in before if slot not in complex_.neighbours]
         back = [slot for slot in self._gone if slot in complex_.neighbours]
@@ -143,7 +142,7 @@ class SwarmProof:
     # --- what has changed -------------------------------------------------------------------------------------------
 
     def _index(self, walks: Sequence[Walk]) -> None:
-        """Find the slots that saw each point of the walks that are new. Another list: some have others."""
+        """Find the slots that saw each point of the new walks. In another list some points are not the same as before."""
         if walks is not self._walks:
             points = [each for walk in walks for each in walk.points]
             same = {number for number, (a, b) in enumerate(zip(self._points, points, strict=False)) if a is b}
@@ -223,7 +222,7 @@ class SwarmProof:
                     fans += self._origins.arcs_of_triangle(slot, each, self._points[each], view[other])
         touched, beside = arcs_of_walls(self._around[slot].touched), self._closed_by_robots(slot)
         opened = complement([*self._followed[slot], *touched, *beside, *fans])
-        contacts = touched if slot in self._scan.bases else ()  # a station cannot look behind what it touches
+        contacts = touched if slot in self._bases else ()  # a station cannot look behind what it touches
         return with_islands(opened, [*self._edged[slot], *contacts, *beside, *fans])
 
     def _closed_without_fans(self, slot: int) -> list[Arc]:
