@@ -90,22 +90,14 @@ def _is_inside(
     neighbours: Mapping[int, Collection[int]],
 ) -> bool:
     """Return whether a triangle of this slot and two others contains a point. One of these sees the point."""
-    here, around = views[slot], neighbours[slot]
-    offs = {each: math.remainder(here[each] - point.seen[slot], math.tau) for each in around}
-    aside = [(each, off) for each, off in offs.items() if abs(off) > INSIDE_RAD]
-    for a in seen:
-        left = offs.get(a, 0.0)
-        if abs(left) <= INSIDE_RAD:
-            continue
-        for b, right in aside:
-            if (
-                left * right < 0.0
-                and abs(left) + abs(right) < math.pi
-                and b in neighbours[a]
-                and is_between(point.seen[a], views[a][slot], views[a][b], INSIDE_RAD)
-            ):
-                return True
-    return False
+    return any(
+        is_between(point.seen[slot], views[slot][a], views[slot][b], INSIDE_RAD)
+        and is_between(point.seen[a], views[a][slot], views[a][b], INSIDE_RAD)
+        for a in seen
+        if a in neighbours[slot]
+        for b in neighbours[slot]
+        if b in neighbours[a]
+    )
 
 
 def is_between(there: float, a: float, b: float, margin_rad: float = 0.0) -> bool:
