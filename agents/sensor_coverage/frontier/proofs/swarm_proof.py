@@ -345,12 +345,15 @@ class SwarmProof:
         return self._triangles.find(number, point, views, self._neighbours, self._versions, at_walls, beside)
 
     def _is_proved(self, slot: int, there: float, other: int) -> bool:
-        """Return whether a slot stands, and walls or triangles of robots without another slot close its direction [rad]."""
+        """Return whether a slot stands, and walls or triangles of robots without another slot close its direction [rad].
+
+        Beside a loose edge of sight they do not: the slots that ask may rely on each other there.
+        """
         if slot not in self._neighbours:
             return False
         known = self._alone.get((slot, other))
         if known is None:
-            walls = *self._followed.get(slot, ()), *arcs_of_walls(self._around[slot].touched)
+            walls = *self._edged.get(slot, ()), *arcs_of_walls(self._around[slot].touched)
             known = self._alone[slot, other] = united([*walls, *self._arcs_between(slot, other)])
         return contains(known, Arc(there, 0.0))
 

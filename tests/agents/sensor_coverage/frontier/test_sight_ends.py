@@ -61,6 +61,15 @@ def test_an_edge_of_sight_is_open_if_nobody_stands_for_what_is_behind_it(
     assert sorted(open_at_0((*BEFORE, behind), (behind, *BEYOND))) == opened
 
 
+@pytest.mark.parametrize(("behind", "proved"), [(point(_1=200), True), (point(), False)])
+def test_no_slot_answers_for_the_space_behind_an_edge_of_sight_that_nobody_saw(behind: WalkPoint, proved: bool) -> None:
+    """Two slots that ask a third one, and of which one relies on the other, would rely on each other."""
+    proof = SwarmProof()
+    proof.update(SCAN, [Walk(0, -1, each) for each in ((*BEFORE, behind), (behind, *BEYOND))], {}, {}, {})
+    assert proof._is_proved(0, math.radians(248.0), 1) is proved
+    assert proof._is_proved(0, math.radians(220.0), 1)
+
+
 def test_an_edge_of_sight_beside_an_open_arc_opens_nothing() -> None:
     assert open_at_0((*BEFORE, point())) == [(250, 150)]
 
