@@ -1,6 +1,7 @@
 """Assignment of deployments: the cheapest first, and at the same time all others that do not cross it."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.decisions import FindRoutes
 from zwerm.agents.sensor_coverage.frontier.paths import CheapestRoutes
@@ -8,14 +9,23 @@ from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.maths.simplicial import FlagComplex
 
+# Walks that go at once, and the number of edges by which their beginnings are apart at least. A leg has 3 m.
+WALKS_MAX: Final = 6
+APART_EDGES: Final = 6
+# Leaders that wait for the robots behind them at most, and the edges by which leaders are apart at least.
+WAITING_MAX: Final = 4
+LEADERS_APART_EDGES: Final = 3
+
 
 class CheapestFirst:
     """Assigns the deployments with the cheapest paths, `pushes_max` at most, that do not cross.
 
     Each path has slots, and the slots that it uses as landmarks. Two pushes do not cross if no slot of one path is
     among those of the other. Then no robot takes a moving robot for a static landmark, and the new slots are far apart.
+    Leaders of other plans drive at the same time, and wait for the robots behind them until those of the former pushes stand.
+
     A plan of lower priority is assigned only where no plan of higher priority is reachable in the same component of the
-    complex. A walk along a wall is assigned alone.
+    complex. Walks along walls are assigned only where nothing else is, and then those that begin far apart.
     """
 
     def __init__(self, slots: Slots, pushes_max: int) -> None:
@@ -42,20 +52,101 @@ class CheapestFirst:
             plan = min(reached)[-1]
             if plan.walk and chosen:
                 break  # a robot that follows a wall needs standing robots around
-            chosen.append(plan._replace(path=routes.path(plan.mover)))
             if plan.walk:
-                break
+                return self._walks(wanted, scan, sources, find_routes)
+            chosen.append(plan._replace(path=routes.path(plan.mover)))
             left = left.without(self._around(self._around(chosen[-1].path, scan), scan))
             routes = find_routes(left, {slot: cost for slot, cost in sources.items() if slot in left.neighbours})
-        return tuple(chosen)
+        return (*chosen, *self._waiting(chosen, wanted, scan, sources, find_routes))
 
-    def _around(self, slots: Collection[int], scan: ScanResult) -> Collection[int]:
+    def _waiting(
+        self,
+        chosen: Sequence[Plan],
+        wanted: Iterable[Plan],
+        scan: ScanResult,
+        sources: Mapping[int, float],
+        find_routes: FindRoutes,
+    ) -> list[Plan]:
+        """Return plans with paths from stations that cross those of the chosen ones, whose leaders can drive at the same time.
+
+        Such a leader waits for the robots behind it, and is no landmark of the robots that move before those.
+        """
+        gone = [plan.path[0] for plan in chosen if plan.path[0] not in scan.bases]
+        stations = {slot: cost for slot, cost in sources.items() if slot in scan.bases}
+        routes = find_routes(scan.complex_.without(gone), stations)
+        found, taken = list[Plan](), dict[int, None]()
+        for plan in chosen:
+            taken |= self._beside(plan, scan)
+        reached = [
+            (routes.cost[plan.mover], plan.mover, plan.key, plan)
+            for plan in wanted
+            if plan.mover in routes.cost and plan.mover not in scan.bases and not plan.walk
+        ]
+        for *_, plan in sorted(reached):
+            if len(found) == min(WAITING_MAX, self._pushes_max - len(chosen)):
+                break
+            if plan.mover not in taken:
+                found.append(plan._replace(path=routes.path(plan.mover), waits=True))
+                taken |= self._beside(found[-1], scan)
+        return found
+
+    def _beside(self, plan: Plan, scan: ScanResult) -> dict[int, None]:
+        """Return the slots from which no leader of a later plan may drive: close to its leader, or landmarks on its path."""
+        return self._around(plan.path, scan) | within(scan.complex_, plan.mover, LEADERS_APART_EDGES)
+
+    def _walks(
+        self, wanted: Iterable[Plan], scan: ScanResult, sources: Mapping[int, float], find_routes: FindRoutes
+    ) -> tuple[Plan, ...]:
+        """Return the cheapest walks that begin far apart, in the order in which the robots set out.
+
+        Those with the longest ways set out first: no path leads past a robot that waits at a wall, because it has set out
+        before. Those whose paths do not cross set out at the same time.
+        """
+        chosen, left, apart = list[Plan](), dict(sources), list[Plan](wanted)
+        while apart and left and len(chosen) < WALKS_MAX:
+            routes = find_routes(scan.complex_, left)
+            reached = [
+                (routes.cost[plan.mover], plan.mover, plan.key, plan) for plan in apart if plan.mover in routes.cost
+            ]
+            if not reached:
+                break
+            plan = min(reached)[-1]
+            apart.remove(plan)
+            path = routes.path(plan.mover)
+            around = self._around([plan.mover], scan)
+            if any(slot in around or slot == path[0] not in scan.bases for each in chosen for slot in each.path):
+                continue
+            chosen.append(plan._replace(path=path))
+            if plan.meet:
+                break
+            if path[0] not in scan.bases:
+                del left[path[0]]
+            near = within(scan.complex_, plan.mover, APART_EDGES)
+            apart = [each for each in apart if each.mover not in near and not each.meet]
+        found, taken = list[Plan](), dict[int, None]()
+        for plan in reversed(chosen):
+            waits = any(slot in taken for slot in plan.path)
+            around = self._around(self._around(plan.path, scan), scan)
+            taken = around if waits else taken | around
+            found.append(plan._replace(waits=waits))
+        return tuple(found)
+
+    def _around(self, slots: Collection[int], scan: ScanResult) -> dict[int, None]:
         """Return the slots, and all slots that they see or remember."""
         found = dict.fromkeys(slots)
         for slot in slots:
             found |= dict.fromkeys(scan.complex_.neighbours.get(slot, ()))
             found |= dict.fromkeys(other for other, _ in self._slots.known_from(slot))
         return found
+
+
+def within(complex_: FlagComplex, slot: int, edges: int) -> dict[int, None]:
+    """Return the slots that a path of so many edges leads to from a slot."""
+    found = ring = {slot: None}
+    for _ in range(edges):
+        ring = {each: None for slot in ring for each in complex_.neighbours.get(slot, ()) if each not in found}
+        found = found | ring
+    return found
 
 
 def _wanted(plans: Iterable[Sequence[Plan]], routes: CheapestRoutes, complex_: FlagComplex) -> list[Plan]:

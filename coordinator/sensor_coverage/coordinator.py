@@ -155,10 +155,8 @@ class SensorCoverageCoordinator:
                 if self._redundancy_is_due():
                     yield from self._find_redundant()  # 5: (periodically) identify redundant robots
                 plans = yield from self._find_paths()  # 6: find path in the 1-skeleton
-                probes = self._probes(plans)
                 # 7 and 8: push robots in path, deploy robot n + 1
-                pushes = probes or [self._carry_out(plan) for plan in plans]
-                pushes = pushes or self.pushing.recalls(self._silent)
+                pushes = self._probes(plans) or self._carry_out(plans) or self.pushing.recalls(self._silent)
             if self._schedule.unscanned and not pushes:
                 self._schedule.scan_next()
                 continue  # only a new scan shows that nothing is left
@@ -167,11 +165,13 @@ class SensorCoverageCoordinator:
             self.outcome = self._judge(bool(pushes))  # 9: while F is not empty
             moved, stopped = moved if self._schedule.unscanned else [], self.pushing.stopped
             moved += [robot for each in (yield from run_concurrently(pushes)) for robot in each]
-            self._schedule.end_cycle(len(pushes), self.pushing.stopped - stopped)
+            self._schedule.end_cycle(max(len(pushes), len(plans)), self.pushing.stopped - stopped)
             yield from self._reconsider_outcome()
 
-    def _carry_out(self, plan: Plan) -> Routine[Moved]:
-        return self.walking.walk(plan, self.scan) if plan.walk else self.pushing.push(plan)
+    def _carry_out(self, plans: Sequence[Plan]) -> list[Routine[Moved]]:
+        if any(plan.walk for plan in plans):
+            return [self.walking.walk(plans, self.scan)]
+        return [self.pushing.push_all(plans)] if plans else []
 
     def _probes(self, plans: Sequence[Plan]) -> list[Routine[Moved]]:
         """Return probes of walls close to slots, before a robot is sent along a wall."""

@@ -5,7 +5,7 @@ Several pushes may run concurrently if no slot of one path is a landmark in anot
 
 import math
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.decisions import FrontierService
@@ -21,7 +21,7 @@ from zwerm.agents.sensor_coverage.motion.push_geometry import (
     future_occupants,
     landmarks_for_move,
 )
-from zwerm.coordinator.sensor_coverage.command_mailbox import CommandMailbox, Routine
+from zwerm.coordinator.sensor_coverage.command_mailbox import CommandMailbox, Routine, run_concurrently
 from zwerm.coordinator.sensor_coverage.sources import Sources
 from zwerm.maths.simplicial import FlagComplex
 
@@ -88,18 +88,49 @@ class PushExecution:
         self._sources.blocked[base] = None
         return ()
 
+    def push_all(self, plans: Iterable[Plan]) -> Routine[Moved]:
+        """Push along the paths of plans, and return the robots that moved.
+
+        All leaders drive at once. The robots behind one whose plan waits follow after those of all earlier plans.
+        """
+        ahead: dict[Plan, tuple[int, dict[int, Arrived] | None]] = {}
+        moved: list[int] = []
+
+        def go(plan: Plan) -> Routine[None]:
+            if plan.waits:
+                ahead[plan] = yield from self._lead(plan)
+            else:
+                moved.extend((yield from self.push(plan)))
+
+        yield from run_concurrently([go(plan) for plan in plans])
+        for plan, (leader, there) in ahead.items():
+            moved += [leader] if there is None else (yield from self._follow(plan, leader, bool(there)))
+        return moved
+
     def push(self, plan: Plan) -> Routine[Moved]:
         """Push along the plan's path, and return the robots that moved. Algorithm 1, lines 7 and 8."""
-        slots = self._slots
         if plan.mover in self.scan.bases:
             return (yield from self._set_out(plan))
-        leader = slots.occupant[plan.path[-1]]
+        leader, there = yield from self._lead(plan)
+        return (leader,) if there is None else (yield from self._follow(plan, leader, bool(there)))
+
+    def _lead(self, plan: Plan) -> Routine[tuple[int, dict[int, Arrived] | None]]:
+        """Let the robot at the mover's slot drive; return it, and what `_test_drive` returns."""
+        leader = self._slots.occupant[plan.mover]
         self._frontier.note_attempt(plan)
-        yield from self.prepare(plan)
-        there = yield from self._test_drive(plan, leader)
-        if there is None:
+        if not plan.waits:
+            yield from self.prepare(plan)
+        return leader, (yield from self._test_drive(plan, leader))
+
+    def _follow(self, plan: Plan, leader: int, there: bool) -> Routine[Moved]:
+        """Move the robots behind the leader up, and correct its place. It has arrived before if `there`."""
+        slots = self._slots
+        if any(slot not in slots.occupant for slot in plan.path):  # an earlier push has lost a robot
+            yield from self._drive_back(plan, leader, there)
             return (leader,)
-        closed_up = yield from self.close_up(plan, leader, bool(there))
+        if plan.waits:
+            yield from self.prepare(plan)
+        closed_up = yield from self.close_up(plan, leader, there)
         if closed_up is None:
             return (leader,)
         followers, arrived = closed_up
@@ -111,6 +142,13 @@ class PushExecution:
             if there_now is not None and slot is not None:
                 slots.note_way(plan.mover, slot, turned_vector(there_now.way, slots.heading[leader]), False)
         return (*followers, leader)
+
+    def _drive_back(self, plan: Plan, leader: int, there: bool) -> Routine[None]:
+        """Let the leader drive back to its slot."""
+        if not there:
+            yield from self._arrivals([leader])
+        self._move([leader], [plan.mover], [plan.mover], {})
+        yield from self._arrivals([leader])
 
     def prepare(self, plan: Plan) -> Routine[None]:
         """Release the next robot early if all robots in sight of its station are about to move: it averages bearings before."""
@@ -154,10 +192,7 @@ class PushExecution:
             yield from self._sources.let_out(base, self.cycle, self.scan.views[base], path)
             released = self._sources.waiting.pop(base, None)
             if released is None:
-                if not there:
-                    yield from self._arrivals([leader])
-                self._move([leader], [plan.mover], [plan.mover], {})
-                yield from self._arrivals([leader])
+                yield from self._drive_back(plan, leader, there)
                 return None
             followers[0] = released
         going = list(path[1:])
@@ -255,8 +290,8 @@ class PushExecution:
     ) -> Routine[dict[int, Arrived]]:
         """Home again on landmarks that were moving before, in groups of robots that are no landmarks of each other.
 
-        A robot that has not returned to its slot yet is no landmark of others. A robot that needs it goes once more. Return
-        the last arrivals of these robots.
+        A robot that has not returned to its slot yet is no landmark of others, unless these have no other landmarks. A robot
+        that needs it goes once more. Return the last arrivals of these robots.
         """
         last: dict[int, Arrived] = {}
         unsettled = {
@@ -275,7 +310,7 @@ class PushExecution:
                 unsettled = {
                     slot: robot
                     for slot, robot in unsettled.items()
-                    if slot not in group or _used_moving_landmarks(arrived, robot)
+                    if slot not in group or (robot in arrived and _waits_for_others(arrived[robot]))
                 }
         return last
 
@@ -322,6 +357,11 @@ def no_landmarks_of_each_other(knows: Mapping[int, Collection[int]]) -> list[int
         if not any(each in landmarks or slot in knows[each] for each in found):
             found.append(slot)
     return found
+
+
+def _waits_for_others(arrived: Arrived) -> bool:
+    """Return whether landmarks that have not returned to their slots determine the place, and odometry does not."""
+    return arrived.used_moving_landmarks and not arrived.used_odometry
 
 
 def _used_moving_landmarks(arrived: Mapping[int, Arrived], robot: int) -> bool:

@@ -37,7 +37,7 @@ from zwerm.agents.sensor_coverage.messages.commands import (
 from zwerm.agents.sensor_coverage.motion.push_geometry import FIRST_BEARINGS_RAD
 from zwerm.agents.sensor_coverage.motion.triangulation import distances_m
 from zwerm.agents.sensor_coverage.motion.walls.wall_walk import CLEAR_M, FIRST_HOP_M, IDLE_LEGS_MAX, LEG_M
-from zwerm.coordinator.sensor_coverage.command_mailbox import CommandMailbox, Routine
+from zwerm.coordinator.sensor_coverage.command_mailbox import CommandMailbox, Routine, run_concurrently
 from zwerm.coordinator.sensor_coverage.push_execution import Moved, PushExecution
 from zwerm.coordinator.sensor_coverage.sources import Sources
 from zwerm.maths.sums import added
@@ -79,6 +79,10 @@ class WallWalks:
         self.idle: dict[int, None] = {}
         self._woken: dict[int, None] = {}  # idle slots that counted again beside an arc that no walk closed
         self.walks = 0
+        self._walking: dict[
+            int, None
+        ] = {}  # robots that have left a slot since the latest scan: its views have no slot there
+        self._left = 0.0  # sum of the open arcs [rad] since the latest leg
         self._slots = slots
         self._mailbox = mailbox
         self._sources = sources
@@ -87,9 +91,43 @@ class WallWalks:
         self._walls = walls
         self._silent = silent
 
-    def walk(self, plan: Plan, scan: ScanResult) -> Routine[Moved]:
-        """Carry out a plan to follow walls, and return the robots that have moved; `scan` has no idle robots."""
+    def walk(self, plans: Iterable[Plan], scan: ScanResult) -> Routine[Moved]:
+        """Carry out plans to follow walls, and return the robots that have moved; `scan` has no idle robots.
+
+        A robot sets out together with those before it, or after them if its plan waits. All follow walls at the same time,
+        while the others stand.
+        """
+        self._walking = {}
+        moved, legs, together = list[int](), list[Routine[None]](), list[list[Plan]]()
+        for plan in plans:
+            if plan.waits or not together:
+                together.append([])
+            together[-1].append(plan)
+        for each in together:
+            still = [self._still(plan, each) for plan in each]
+            went = [self._set_out(plan, scan, legs, here) for plan, here in zip(each, still, strict=True)]
+            moved += [robot for robots in (yield from run_concurrently(went)) for robot in robots]
+        if legs:
+            self._left = self._open(scan)
+            yield from run_concurrently(legs)
+        return moved
+
+    def _still(self, plan: Plan, together: Iterable[Plan]) -> set[int]:
+        """Return the robots that stand at their slots while the robot of one of several plans drives to a wall."""
+        occupant = self._slots.occupant
+        going = {occupant.get(slot) for each in together if each is not plan for slot in each.path}
+        return {robot for robot in occupant.values() if robot not in self._walking and robot not in going}
+
+    def _set_out(
+        self, plan: Plan, scan: ScanResult, legs: list[Routine[None]], still: Collection[int]
+    ) -> Routine[Moved]:
+        """Let a robot drive to a wall, and the others close up; return those that have moved. Its legs are added to `legs`.
+
+        The robots `still` stand at their slots meanwhile.
+        """
         slots, pushing = self._slots, self._pushing
+        if any(slot not in slots.occupant for slot in plan.path):  # an earlier walk has lost a robot
+            return ()
         self._frontier.note_attempt(plan)
         station = plan.mover in pushing.scan.bases
         if station:
@@ -108,10 +146,12 @@ class WallWalks:
         if walked is None:  # dead
             self._sources.waiting.pop(plan.mover, None)
             return (leader,)
-        self._note_near(leader, plan.mover, walked, -plan.hand)
+        moving = [robot for robot in slots.occupant.values() if robot not in still]
+        self._note_near(leader, plan.mover, walked, -plan.hand, moving)
         if walked.end == SHUT:
             pushing.stopped += 1
             return (leader,)
+        self._walking[leader] = None
         followers: Sequence[int] = ()
         if station:
             del self._sources.waiting[plan.mover]
@@ -130,7 +170,9 @@ class WallWalks:
             return (*followers, leader)
         keep = (slots.occupant[plan.mover],) if plan.beside and plan.mover in slots.occupant else ()
         meet = tuple(slots.occupant[each] for each in plan.meet if each in slots.occupant)
-        yield from self._legs(leader, plan.mover, walked, FollowWall(pushing.cycle, LEG_M, plan.hand, keep, meet), scan)
+        legs.append(
+            self._legs(leader, plan.mover, walked, FollowWall(pushing.cycle, LEG_M, plan.hand, keep, meet), scan)
+        )
         return (*followers, leader)
 
     def probe(self, plans: Sequence[Plan], moving: Collection[int]) -> Routine[Moved]:
@@ -229,22 +271,24 @@ class WallWalks:
         slots, idle_legs = self._slots, 0
         number: int | None = None
         way: list[Waypoint] = []
-        left = self._open(scan)
-        while (left > 0.0 or leg.meet) and idle_legs < IDLE_LEGS_MAX:
+        others = [each for each in self._walking if each != leader]
+        while (self._left > 0.0 or leg.meet) and idle_legs < IDLE_LEGS_MAX:
             walked = yield from self._order(leader, leg)
             if walked is None:
                 return
-            there, stays = walked, walked.end in (LOST, MET)
-            repeats = leads_again(way, walked.waypoints)
-            way += walked.waypoints
-            number = slots.take_walk(leader, leg.hand, walked.waypoints, walked.radius_m, number, stays)
+            waypoints = before_meeting(walked.waypoints, others)
+            meets = len(waypoints) < len(walked.waypoints)
+            there, stays = walked, walked.end in (LOST, MET) and not meets
+            repeats = leads_again(way, waypoints)
+            way += waypoints
+            number = slots.take_walk(leader, leg.hand, waypoints, walked.radius_m, number, stays, moving=others)
             if stays:
                 self._measure(leader, origin, there, way)
                 return
             self.idle = without_witnesses(self.idle, slots.walks[number].points)
-            before, left = left, self._open(scan)
-            idle_legs = idle_legs + 1 if left > before - PROGRESS_RAD or walked.end == SHUT else 0
-            if repeats:
+            before, self._left = self._left, self._open(scan)
+            idle_legs = idle_legs + 1 if self._left > before - PROGRESS_RAD or walked.end == SHUT else 0
+            if repeats or meets:
                 break
         self._measure(leader, origin, there, way)
         self.idle[slots.slot_of()[leader]] = None
@@ -314,6 +358,14 @@ def past_dead(command: ToWall | FollowWall, silent: Collection[int]) -> ToWall |
         return command
     named = ToWallPastDead if isinstance(command, ToWall) else FollowWallPastDead
     return named(**msgspec.structs.asdict(command), dead=dead)
+
+
+def before_meeting(way: Sequence[Waypoint], others: Collection[int]) -> Sequence[Waypoint]:
+    """Return the waypoints before the first one from which one of the other walking robots was in sight."""
+    for number, each in enumerate(way):
+        if any(one.node in others for one in each.sightings) or any(one in others for one in each.robots):
+            return way[:number]
+    return way
 
 
 def leads_again(way: Sequence[Waypoint], leg: Iterable[Waypoint]) -> bool:
