@@ -69,7 +69,8 @@ class CheapestFirst:
     ) -> list[Plan]:
         """Return plans with paths from stations that cross those of the chosen ones, whose leaders can drive at the same time.
 
-        Such a leader waits for the robots behind it, and is no landmark of the robots that move before those.
+        Such a leader waits for the robots behind it, and is no landmark of the robots that move before those. It drives into a
+        gap: walls stop most of these drives. Beside edges the lattice would grow from several places, and need more robots.
         """
         gone = [plan.path[0] for plan in chosen if plan.path[0] not in scan.bases]
         stations = {slot: cost for slot, cost in sources.items() if slot in scan.bases}
@@ -80,7 +81,7 @@ class CheapestFirst:
         reached = [
             (routes.cost[plan.mover], plan.mover, plan.key, plan)
             for plan in wanted
-            if plan.mover in routes.cost and plan.mover not in scan.bases and not plan.walk
+            if plan.mover in routes.cost and plan.mover not in scan.bases and not plan.walk and not plan.key[2]
         ]
         for *_, plan in sorted(reached):
             if len(found) == min(WAITING_MAX, self._pushes_max - len(chosen)):
@@ -99,8 +100,9 @@ class CheapestFirst:
     ) -> tuple[Plan, ...]:
         """Return the cheapest walks that begin far apart, in the order in which the robots set out.
 
-        Those with the longest ways set out first: no path leads past a robot that waits at a wall, because it has set out
-        before. Those whose paths do not cross set out at the same time.
+        One robot comes from a station at most, the others from earlier walks: a single walk may close all that is open, and
+        robots that have walked stay where they are. Those with the longest ways set out first: no path leads past a robot that
+        waits at a wall, because it has set out before. Those whose paths do not cross set out at the same time.
         """
         chosen, left, apart = list[Plan](), dict(sources), list[Plan](wanted)
         while apart and left and len(chosen) < WALKS_MAX:
@@ -119,8 +121,11 @@ class CheapestFirst:
             chosen.append(plan._replace(path=path))
             if plan.meet:
                 break
-            if path[0] not in scan.bases:
-                del left[path[0]]
+            left = {
+                slot: cost
+                for slot, cost in left.items()
+                if slot != path[0] and not (path[0] in scan.bases and slot in scan.bases)
+            }
             near = within(scan.complex_, plan.mover, APART_EDGES)
             apart = [each for each in apart if each.mover not in near and not each.meet]
         found, taken = list[Plan](), dict[int, None]()

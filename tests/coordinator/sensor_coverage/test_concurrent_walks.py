@@ -45,35 +45,39 @@ def assigned(plans: Sequence[Plan], sources: dict[int, float], slots: Slots | No
 
 
 def test_walks_at_the_ends_of_two_files_go_at_once() -> None:
-    paths = assigned([walk(40), walk(60)], {0: 0.0})
-    assert [(each[0], each[-1]) for each in paths] == [(0, 60), (0, 40)]
+    assert assigned([walk(40), walk(60)], {0: 0.0, 59: -100.0}) == [tuple(range(41)), (59, 60)]
+
+
+def test_one_robot_comes_from_a_station() -> None:
+    """It may close all that is open."""
+    assert assigned([walk(40), walk(60)], {0: 0.0}) == [tuple(range(41))]
 
 
 @pytest.mark.parametrize(("other", "count"), [(APART_EDGES, 1), (APART_EDGES + 1, 2)])
 def test_walks_that_begin_close_to_each_other_go_one_after_the_other(other: int, count: int) -> None:
-    assert len(assigned([walk(40), walk(40 - other)], {0: 0.0})) == count
+    assert len(assigned([walk(40), walk(40 - other)], {0: 0.0, 39: -100.0})) == count
 
 
 def test_robots_set_out_at_the_same_time_where_their_paths_do_not_cross() -> None:
     def waiting(sources: dict[int, float]) -> list[tuple[int, bool]]:
         return [(each.mover, each.waits) for each in plans_of([walk(MIDDLE), walk(40), walk(60)], sources)]
 
-    assert waiting({0: 0.0}) == [(60, False), (40, True), (MIDDLE, True)]
     assert waiting({0: 0.0, 59: -100.0, 39: -100.0}) == [(MIDDLE, False), (60, False), (40, False)]
-    assert waiting({0: 0.0, 39: -100.0}) == [(60, False), (MIDDLE, True), (40, False)]
+    assert waiting({0: 0.0, 21: -100.0, 39: -100.0}) == [(60, False), (40, False), (MIDDLE, True)]
 
 
 def test_the_robot_with_the_longest_way_sets_out_first_so_that_nobody_waits_beside_its_way() -> None:
-    assert [each[-1] for each in assigned([walk(MIDDLE), walk(40), walk(1)], {0: 0.0})] == [40, MIDDLE, 1]
+    assert [each[-1] for each in assigned([walk(MIDDLE), walk(40)], {0: 0.0, MIDDLE - 1: -100.0})] == [40, MIDDLE]
 
 
 def test_no_robot_sets_out_past_one_that_has_set_out_before() -> None:
     slots = Slots()
     for robot in FORK.vertices:
         slots.add(robot)
-    assert len(assigned([walk(40), walk(60)], {0: 0.0}, slots)) == 2
-    slots.remember(60, 25, 0.0)
-    assert len(assigned([walk(40), walk(60)], {0: 0.0}, slots)) == 1, "the robot at 60 would wait beside it"
+    sources = {0: 0.0, 59: -100.0}
+    assert len(assigned([walk(40), walk(60)], sources, slots)) == 2
+    slots.remember(40, 59, 0.0)
+    assert len(assigned([walk(40), walk(60)], sources, slots)) == 1, "the robot at 40 would wait beside it"
 
 
 def test_the_robot_of_a_redundant_slot_sets_out_once() -> None:
