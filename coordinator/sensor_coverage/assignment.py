@@ -12,6 +12,8 @@ from zwerm.maths.simplicial import FlagComplex
 # Walks that go at once, and the number of edges by which their beginnings are apart at least. A leg has 3 m.
 WALKS_MAX: Final = 6
 APART_EDGES: Final = 6
+# Slots for each robot that a station releases for these walks.
+SLOTS_PER_WALK: Final = 60
 # Leaders that wait for the robots behind them at most, and the edges by which leaders are apart at least.
 WAITING_MAX: Final = 4
 LEADERS_APART_EDGES: Final = 3
@@ -100,11 +102,13 @@ class CheapestFirst:
     ) -> tuple[Plan, ...]:
         """Return the cheapest walks that begin far apart, in the order in which the robots set out.
 
-        One robot comes from a station at most, the others from earlier walks: a single walk may close all that is open, and
-        robots that have walked stay where they are. Those with the longest ways set out first: no path leads past a robot that
-        waits at a wall, because it has set out before. Those whose paths do not cross set out at the same time.
+        One robot for each `SLOTS_PER_WALK` slots comes from stations, the others from earlier walks: a single walk may close
+        all that is open, and robots that have walked stay where they are. Those with the longest ways set out first: no path
+        leads past a robot that waits at a wall, because it has set out before. Those whose paths do not cross set out at the
+        same time.
         """
         chosen, left, apart = list[Plan](), dict(sources), list[Plan](wanted)
+        released, released_max = 0, max(1, len(scan.complex_.vertices) // SLOTS_PER_WALK)
         while apart and left and len(chosen) < WALKS_MAX:
             routes = find_routes(scan.complex_, left)
             reached = [
@@ -121,11 +125,9 @@ class CheapestFirst:
             chosen.append(plan._replace(path=path))
             if plan.meet:
                 break
-            left = {
-                slot: cost
-                for slot, cost in left.items()
-                if slot != path[0] and not (path[0] in scan.bases and slot in scan.bases)
-            }
+            released += path[0] in scan.bases
+            spent = (path[0],) if path[0] not in scan.bases else scan.bases if released >= released_max else ()
+            left = {slot: cost for slot, cost in left.items() if slot not in spent}
             near = within(scan.complex_, plan.mover, APART_EDGES)
             apart = [each for each in apart if each.mover not in near and not each.meet]
         found, taken = list[Plan](), dict[int, None]()

@@ -9,7 +9,7 @@ from zwerm.agents.sensor_coverage.frontier.paths import CheapestRoutes, Dijkstra
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
-from zwerm.coordinator.sensor_coverage.assignment import APART_EDGES, WALKS_MAX, CheapestFirst, within
+from zwerm.coordinator.sensor_coverage.assignment import APART_EDGES, SLOTS_PER_WALK, WALKS_MAX, CheapestFirst, within
 from zwerm.coordinator.sensor_coverage.coordinator import SensorCoverageCoordinator
 from zwerm.coordinator.sensor_coverage.wall_walks import before_meeting
 from zwerm.deploy.node_specs import node_specs
@@ -48,9 +48,12 @@ def test_walks_at_the_ends_of_two_files_go_at_once() -> None:
     assert assigned([walk(40), walk(60)], {0: 0.0, 59: -100.0}) == [tuple(range(41)), (59, 60)]
 
 
-def test_one_robot_comes_from_a_station() -> None:
-    """It may close all that is open."""
+def test_a_station_releases_one_robot_for_each_60_slots() -> None:
+    """One may close all that is open."""
+    assert len(FORK.vertices) == SLOTS_PER_WALK + 1
     assert assigned([walk(40), walk(60)], {0: 0.0}) == [tuple(range(41))]
+    larger = FlagComplex({**FORK.neighbours, **dict.fromkeys(range(61, 2 * SLOTS_PER_WALK), ())})
+    assert [each.mover for each in plans_of([walk(40), walk(60)], {0: 0.0}, complex_=larger)] == [60, 40]
 
 
 @pytest.mark.parametrize(("other", "count"), [(APART_EDGES, 1), (APART_EDGES + 1, 2)])
