@@ -9,12 +9,12 @@ from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.maths.simplicial import FlagComplex
 
-# Walks that go at once, and the number of edges by which their beginnings are apart at least. A leg has 3 m.
+# Walks that go at once. Their slots are more than this number of edges apart: a leg has 3 m.
 WALKS_MAX: Final = 6
 APART_EDGES: Final = 6
 # Slots for each robot that a station releases for these walks.
 SLOTS_PER_WALK: Final = 60
-# Leaders that wait for the robots behind them at most, and the edges by which leaders are apart at least.
+# Leaders that wait for the robots behind them at most. Leaders begin more than this number of edges apart.
 WAITING_MAX: Final = 4
 LEADERS_APART_EDGES: Final = 3
 

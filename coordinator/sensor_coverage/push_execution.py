@@ -5,7 +5,7 @@ Several pushes may run concurrently if no slot of one path is a landmark in anot
 
 import math
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.decisions import FrontierService
@@ -88,10 +88,11 @@ class PushExecution:
         self._sources.blocked[base] = None
         return ()
 
-    def push_all(self, plans: Iterable[Plan]) -> Routine[Moved]:
+    def push_all(self, plans: Sequence[Plan]) -> Routine[Moved]:
         """Push along the paths of plans, and return the robots that moved.
 
-        All leaders drive at once. The robots behind one whose plan waits follow after those of all earlier plans.
+        All leaders drive at once. The robots behind one whose plan waits follow after those of all earlier plans: their way may
+        lead through the slot that an earlier leader has left.
         """
         ahead: dict[Plan, tuple[int, dict[int, Arrived] | None]] = {}
         moved: list[int] = []
@@ -103,7 +104,8 @@ class PushExecution:
                 moved.extend((yield from self.push(plan)))
 
         yield from run_concurrently([go(plan) for plan in plans])
-        for plan, (leader, there) in ahead.items():
+        for plan in (each for each in plans if each.waits):
+            leader, there = ahead[plan]
             moved += [leader] if there is None else (yield from self._follow(plan, leader, bool(there)))
         return moved
 

@@ -79,9 +79,7 @@ class WallWalks:
         self.idle: dict[int, None] = {}
         self._woken: dict[int, None] = {}  # idle slots that counted again beside an arc that no walk closed
         self.walks = 0
-        self._walking: dict[
-            int, None
-        ] = {}  # robots that have left a slot since the latest scan: its views have no slot there
+        self._walking: dict[int, None] = {}  # robots on walks of this cycle: the scan has no slot where they are
         self._left = 0.0  # sum of the open arcs [rad] since the latest leg
         self._slots = slots
         self._mailbox = mailbox

@@ -4,13 +4,20 @@ from collections.abc import Sequence
 
 import pytest
 
+from zwerm.agents.runtime.node import Node
 from zwerm.agents.sensor_coverage.frontier.paths import CheapestRoutes, Dijkstra
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
+from zwerm.agents.sensor_coverage.messages.commands import Arrived
 from zwerm.coordinator.sensor_coverage.assignment import LEADERS_APART_EDGES, WAITING_MAX, CheapestFirst
+from zwerm.coordinator.sensor_coverage.command_mailbox import Routine
+from zwerm.coordinator.sensor_coverage.coordinator import SensorCoverageCoordinator
 from zwerm.coordinator.sensor_coverage.push_execution import Moved, PushExecution
+from zwerm.deploy.node_specs import node_specs
 from zwerm.maths.simplicial import FlagComplex
 from zwerm.run.runner import run
+from zwerm.scenario.load import load
+from zwerm.wire.messages import Wake
 
 # Ten files of 8 robots around a station (0): 1 to 8, 11 to 18, and so on.
 FILES, LENGTH = 10, 8
@@ -64,6 +71,29 @@ def test_the_number_of_leaders_that_wait_is_bounded() -> None:
 
 def test_only_the_robots_of_stations_follow_a_leader_that_waits() -> None:
     assert assigned([8, 17], bases=()) == [(17, False)]
+
+
+def test_robots_follow_in_the_order_of_plans_whoever_is_clear_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The second path leads through the slot that the first leader has left."""
+    coordinator = Node(*node_specs(load("sensor-coverage", ("robots.count=3",)), 1)[3])._controller
+    assert isinstance(coordinator, SensorCoverageCoordinator)
+    order, drives = list[int](), {4: 3, 8: 1}
+
+    def lead(_: PushExecution, plan: Plan) -> Routine[tuple[int, dict[int, Arrived] | None]]:
+        yield from [Wake()] * drives[plan.mover]
+        return plan.mover, {}
+
+    def follow(_: PushExecution, plan: Plan, leader: int, there: bool) -> Routine[Moved]:
+        order.append(leader)
+        yield Wake()
+        return (leader,)
+
+    monkeypatch.setattr(PushExecution, "_lead", lead)
+    monkeypatch.setattr(PushExecution, "_follow", follow)
+    plans = [Plan((n, n, 0), n, 0.0, 0.95, 0.8, (n,), tuple(range(n + 1)), waits=True) for n in drives]
+    for _ in coordinator.pushing.push_all(plans):
+        pass
+    assert order == [4, 8]
 
 
 @pytest.mark.parametrize("faults", ["", '{kind="crash", fraction=0.1, between_s=[20.0, 200.0]}'])
