@@ -244,10 +244,12 @@ class Slots:
         )
         if origin is not None:
             origin = Origin(origin.slot, turned_vector(origin.at, heading), self.occupant[origin.slot])
-        before_it = () if after is None else tail(self.walks[after].points, JOINED_M)
-        self.walks.append(
-            Walk(frame, hand, before_it + points, radius_m, slot_of.get(robot) if stays else None, origin)
-        )
+        touched = {slot: self.occupant[slot] for each in points for slot in each.robots}
+        if after is not None:
+            points = tail(self.walks[after].points, JOINED_M) + points
+            touched |= self.walks[after].robots
+        end = slot_of.get(robot) if stays else None
+        self.walks.append(Walk(frame, hand, points, radius_m, end, origin, touched))
         return len(self.walks) - 1
 
     def note_near(self, slot: int, arcs: Sequence[NearArc]) -> None:

@@ -16,6 +16,7 @@ these stand.
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from zwerm.maths.sums import added
@@ -89,10 +90,9 @@ class NearArc(NamedTuple):
 class WalkPoint(NamedTuple):
     """A point of a walk: the direction [rad] to it from each slot that it sees, the directions of walls that it touches.
 
-    `robots` are the slots that the walking robot touches. `at_body` is true if it touches a robot that stands at no slot.
-    `left_walls` is true if it does not follow the wall of the point before any more (`leaves_wall`).
-    `unplaced` are the marks (`mark_of`) of robots that see the point, and of which no slot is known. `at` is the place [m] of
-    the walking robot by its odometry, in the frame of the directions.
+    `robots` are the slots that the walking robot touches. `at_body` is true if it touches a robot that stands at no slot,
+    `left_walls` if it does not follow the wall of the point before any more (`leaves_wall`). `unplaced` are the marks
+    (`mark_of`) of robots without a known slot that see the point. `at` is the robot's place [m] by odometry, in this frame.
     """
 
     seen: Mapping[int, float]
@@ -159,7 +159,7 @@ class Walk(NamedTuple):
     """A stretch of wall that a robot followed, in the frame of one robot; `hand` is +1 if the wall was on the left.
 
     `radius_m` is the radius of its body. `end` is the slot of the walking robot if it stands at the end of the walk. `origin`
-    is the slot that it left, if all points are close to that.
+    is the slot that it left, if all points are close to that. `robots` stood at the slots that it touched.
     """
 
     frame: int
@@ -168,6 +168,7 @@ class Walk(NamedTuple):
     radius_m: float = 0.0
     end: int | None = None
     origin: Origin | None = None
+    robots: Mapping[int, int] = MappingProxyType({})
 
     def turned(self, frame: int, by: float) -> "Walk":
         """Return the walk in another frame."""
@@ -178,8 +179,7 @@ class Walk(NamedTuple):
         """Yield the direction [rad] of each point from the origin by odometry, and the point."""
         if self.origin is not None:
             x_m, y_m = self.origin.at
-            for each in self.points:
-                yield math.atan2(each.at[1] - y_m, each.at[0] - x_m), each
+            yield from ((math.atan2(each.at[1] - y_m, each.at[0] - x_m), each) for each in self.points)
 
     def unseen_by(self, slots: Collection[int]) -> "Walk":
         """Return the walk as if these slots had not seen it."""
