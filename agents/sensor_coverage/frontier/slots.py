@@ -244,12 +244,12 @@ class Slots:
         )
         if origin is not None:
             origin = Origin(origin.slot, turned_vector(origin.at, heading), self.occupant[origin.slot])
-        touched = {slot: self.occupant[slot] for each in points for slot in each.robots}
+        contacts = {slot: tuple(self.touching.get(slot, ())) for each in points for slot in each.robots}
         if after is not None:
             points = tail(self.walks[after].points, JOINED_M) + points
-            touched |= self.walks[after].robots
+            contacts = {**self.walks[after].contacts, **contacts}
         end = slot_of.get(robot) if stays else None
-        self.walks.append(Walk(frame, hand, points, radius_m, end, origin, touched))
+        self.walks.append(Walk(frame, hand, points, radius_m, end, origin, contacts))
         return len(self.walks) - 1
 
     def note_near(self, slot: int, arcs: Sequence[NearArc]) -> None:

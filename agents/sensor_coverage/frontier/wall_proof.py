@@ -4,14 +4,12 @@ Every triangle of the proof has a standing robot i as a corner. Robot i sees the
 a point of a walk along a wall. Its sides are free lines of sight, or a step of the walk. So i sees the whole triangle.
 A robot is closed if such triangles fill the full turn around it. The robots at the ends of a triangle's side are
 responsible for the space beyond it. Beyond a step of a walk is a wall. An open arc is frontier until a robot went there.
-
 An obstacle that lies within one triangle, whose sides are at most r_v long, is not found.
 
 A triangle of two slots and a point of a walk counts only if the space beyond its sides is proved, too: two such triangles
 with different points may cross, and each slot would rely on the other's (`frontier.fans`).
 
-Walks are remembered in directions from the slots that saw them. What a slot closed together with others counts while
-these stand.
+Walks are remembered in directions from the slots that saw them. What a slot closed with others counts while these stand.
 """
 
 import math
@@ -159,7 +157,7 @@ class Walk(NamedTuple):
     """A stretch of wall that a robot followed, in the frame of one robot; `hand` is +1 if the wall was on the left.
 
     `radius_m` is the radius of its body. `end` is the slot of the walking robot if it stands at the end of the walk. `origin`
-    is the slot that it left, if all points are close to that. `robots` stood at the slots that it touched.
+    is the slot that it left, if all points are close to that. `contacts` has what the robots that it touched touched, by slot.
     """
 
     frame: int
@@ -168,12 +166,14 @@ class Walk(NamedTuple):
     radius_m: float = 0.0
     end: int | None = None
     origin: Origin | None = None
-    robots: Mapping[int, int] = MappingProxyType({})
+    contacts: Mapping[int, tuple[float, ...]] = MappingProxyType({})
 
     def turned(self, frame: int, by: float) -> "Walk":
         """Return the walk in another frame."""
         origin = None if self.origin is None else self.origin._replace(at=turned_vector(self.origin.at, by))
-        return self._replace(frame=frame, points=tuple(each.turned(by) for each in self.points), origin=origin)
+        contacts = {slot: tuple(each + by for each in walls) for slot, walls in self.contacts.items()}
+        points = tuple(each.turned(by) for each in self.points)
+        return self._replace(frame=frame, points=points, origin=origin, contacts=contacts)
 
     def way_from_origin(self) -> Iterator[tuple[float, WalkPoint]]:
         """Yield the direction [rad] of each point from the origin by odometry, and the point."""

@@ -72,7 +72,6 @@ class SwarmProof:
         self._origins = WalkOrigins()
         self._passed: dict[int, list[Passed]] = {}
         self._witnessed: dict[int, dict[int, None]] = {}  # slots that rely on points which this slot saw
-        self._placed: dict[int, None] = {}  # slots of which it matters which robot stands there
         self._gone: dict[int, None] = {}  # slots that stood in an earlier scan
         self._views: dict[int, Mapping[int, float]] = {}  # the directions [rad] of the neighbours, by slot
         self._versions: dict[int, int] = {}  # changes of what a slot sees
@@ -81,7 +80,7 @@ class SwarmProof:
 
     def _forget(self) -> None:
         self._bases: Collection[int] = ()
-        self._robots: dict[int, int] = {}  # at slots at which walks have begun or come by in touch
+        self._robots: dict[int, int] = {}  # at slots at which walks have begun
         self._neighbours: dict[int, frozenset[int]] = {}
         self._around: dict[int, ArcBasis] = {}
         self._followed: dict[int, list[Arc]] = {}  # arcs that end at followed walls or at contacts, by slot
@@ -109,8 +108,7 @@ class SwarmProof:
         """
         before = self._neighbours
         self._index(walks)
-        self._bases = scan.bases
-        self._robots = {slot: occupants[slot] for slot in self._placed if slot in occupants}
+        self._bases, self._robots = scan.bases, self._origins.robots_at(occupants)
         complex_ = scan.complex_
         gone = [slot for slot in before if slot not in complex_.neighbours]
         back = [slot for slot in self._gone if slot in complex_.neighbours]
@@ -149,15 +147,12 @@ class SwarmProof:
             points = [each for walk in walks for each in walk.points]
             same = {number for number, (a, b) in enumerate(zip(self._points, points, strict=False)) if a is b}
             self._walks, self._count = walks, 0
-            self._points, self._passed, self._witnessed, self._placed = [], {}, {}, {}
-            self._origins = WalkOrigins()
+            self._points, self._passed, self._witnessed, self._origins = [], {}, {}, WalkOrigins()
             self._triangles.begin_again(same)
             self._forget()
         for walk in walks[self._count :]:
             for slot, passed in passes(walk, len(self._points)):
                 self._passed.setdefault(slot, []).append(passed)
-                if passed.pockets:
-                    self._placed[slot] = None
                 self._triangles.add(slot, passed.number, passed.stretch, len(self._points), passed.point)
                 ends = (*passed.ends, *(pocket.other for _, pocket in passed.pockets))
                 relied = (*passed.between, *(e.ties for e in ends), *(e.witnesses for e in passed.sight_ends))
@@ -165,7 +160,6 @@ class SwarmProof:
                     self._witnessed.setdefault(each, {})[slot] = None
             self._origins.add(len(self._points), walk)
             if walk.origin is not None:
-                self._placed[walk.origin.slot] = None
                 self._triangles.add_way(walk.origin.slot, len(self._points), walk.way_from_origin())
             self._points += walk.points
         self._count = len(walks)
@@ -317,8 +311,7 @@ class SwarmProof:
                 crossings.setdefault(stretch, []).extend(crossings_of_step(slot, before, point, hand, loose))
             edges.setdefault(stretch, []).extend(each for each in sight_ends if each.is_loose(self._neighbours))
             for first_number, pocket in pockets:
-                walls = around.touched if around.robot == pocket.robot else ()
-                contacts += arcs_beside_pocket(hand, pocket, walls)
+                contacts += arcs_beside_pocket(hand, pocket, pocket.contacts)
                 if pocket.in_touch or (first_number, pocket.is_last) not in beside:
                     beside[first_number, pocket.is_last] = hand, pocket
         for (first_number, _), (hand, pocket) in beside.items():

@@ -37,6 +37,11 @@ class WalkOrigins:
     def __init__(self) -> None:
         self._touched: dict[int, _Touched] = {}
         self._origins: dict[int, Origin] = {}
+        self._slots: dict[int, None] = {}
+
+    def robots_at(self, occupants: Mapping[int, int]) -> dict[int, int]:
+        """Return the robots at the slots at which walks have begun."""
+        return {slot: occupants[slot] for slot in self._slots if slot in occupants}
 
     def standing(self, number: int, point: WalkPoint, robots: Mapping[int, int]) -> WalkPoint:
         """Return a point as if its origin had not seen it, if another robot stands there now."""
@@ -50,6 +55,7 @@ class WalkOrigins:
         if walk.origin is None:
             return
         slot, place, _ = walk.origin
+        self._slots[slot] = None
         for number, point in enumerate(walk.points, first):
             self._origins[number] = walk.origin
             if slot in point.seen and point.walls:

@@ -43,15 +43,12 @@ def closed_deg(walk: Walk, *standing: int) -> list[tuple[int, int]]:
     return closed_ranges(proof_of(walk, (0, *standing)))
 
 
-def proof_of(
-    walk: Walk, standing: tuple[int, ...], touched_deg: tuple[float, ...] = (), robot: int | None = None
-) -> SwarmProof:
-    """Return the proof of these slots, which do not see each other. The `robot` at slot 0 touches walls there [degrees]."""
+def proof_of(walk: Walk, standing: tuple[int, ...], touched_deg: tuple[float, ...] = ()) -> SwarmProof:
+    """Return the proof of these slots, which do not see each other; slot 0 touches walls in these directions [degrees]."""
     views = {each: dict[int, float]() for each in standing}
     proof = SwarmProof()
     touched = {0: tuple(math.radians(each) for each in touched_deg)}
-    occupants = {} if robot is None else {0: robot}
-    proof.update(ScanResult(views, FlagComplex(views), ()), (walk,), touched, {}, {}, occupants)
+    proof.update(ScanResult(views, FlagComplex(views), ()), (walk,), touched, {}, {})
     return proof
 
 
@@ -145,16 +142,14 @@ def tied(walk: Walk) -> Walk:
 
 
 def test_between_two_contacts_that_no_opening_fits_between_all_is_closed() -> None:
-    """The pocket ends at -40 degrees, and what the slot's robot touches at -45 degrees."""
-    proof = proof_of(tied(way_to(math.radians(5.0))), (0, 1), (-90.0,))
-    assert closed_ranges(proof) == [(-135, 1)]
+    """The pocket ends at -40 degrees, and what the slot's robot touches at -45 degrees.
 
-
-def test_what_another_robot_touches_at_the_slot_closes_nothing_beside_the_pocket() -> None:
-    """Robot 8 was at the slot when it was touched. Another one stands 0.09 m away, and touches another wall."""
-    walk = tied(way_to(math.radians(5.0)))._replace(robots={0: 8})
-    assert closed_ranges(proof_of(walk, (0, 1), (-90.0,), 8)) == [(-135, 1)]
-    assert closed_ranges(proof_of(walk, (0, 1), (-90.0,), 9)) == [(-40, -45), (-135, 1)], "open from -45 to -40"
+    Another robot at the slot may stand 0.09 m away, and touch the other side of a passage there.
+    """
+    walk = tied(way_to(math.radians(5.0)))
+    touching = walk._replace(contacts={0: (math.radians(-90.0),)})
+    assert closed_ranges(proof_of(touching, (0, 1), (-90.0,))) == [(-135, 1)]
+    assert closed_ranges(proof_of(walk, (0, 1), (-90.0,))) == [(-40, -45), (-135, 1)], "it touched no wall then"
 
 
 def test_a_contact_on_the_other_side_of_a_robot_closes_nothing_between() -> None:
