@@ -292,8 +292,8 @@ class PushExecution:
     ) -> Routine[dict[int, Arrived]]:
         """Home again on landmarks that were moving before, in groups of robots that are no landmarks of each other.
 
-        A robot that has not returned to its slot yet is no landmark of others. A robot that needs it goes once more. Return
-        the last arrivals of these robots.
+        A robot that has not returned to its slot yet is no landmark of others, unless these have no other landmarks. A robot
+        that needs it goes once more. Return the last arrivals of these robots.
         """
         last: dict[int, Arrived] = {}
         unsettled = {
@@ -312,7 +312,7 @@ class PushExecution:
                 unsettled = {
                     slot: robot
                     for slot, robot in unsettled.items()
-                    if slot not in group or _used_moving_landmarks(arrived, robot)
+                    if slot not in group or (robot in arrived and _waits_for_others(arrived[robot]))
                 }
         return last
 
@@ -359,6 +359,11 @@ def no_landmarks_of_each_other(knows: Mapping[int, Collection[int]]) -> list[int
         if not any(each in landmarks or slot in knows[each] for each in found):
             found.append(slot)
     return found
+
+
+def _waits_for_others(arrived: Arrived) -> bool:
+    """Return whether landmarks that have not returned to their slots determine the place, and odometry does not."""
+    return arrived.used_moving_landmarks and not arrived.used_odometry
 
 
 def _used_moving_landmarks(arrived: Mapping[int, Arrived], robot: int) -> bool:

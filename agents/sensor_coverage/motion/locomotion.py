@@ -76,10 +76,10 @@ class Locomotion:
         if self.bearing_noise_rad is None:
             self.bearing_noise_rad = self.frame.spread()
 
-    def drive_to(self, goal: Vector, near_m: float | None = None) -> Drive:
-        """Drive by odometry until the robot is within `near_m` of a point of its frame."""
+    def drive_to(self, goal: Vector, near_m: float | None = None, ticks_max: int | None = None) -> Drive:
+        """Drive by odometry until the robot is within `near_m` of a point of its frame, or for `ticks_max`."""
         near_m = self.parameters.tolerance_m if near_m is None else near_m
-        for _ in range(self.parameters.drive_ticks_max):
+        for _ in range(self.parameters.drive_ticks_max if ticks_max is None else ticks_max):
             dx, dy = goal[0] - self.frame.x_m, goal[1] - self.frame.y_m
             if math.hypot(dx, dy) < near_m:
                 return

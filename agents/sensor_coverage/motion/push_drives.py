@@ -33,6 +33,10 @@ NOISY_NEAR_M: Final = 0.06
 # Longest step [m] between two averages there. Where a wall has stopped the move far from its goal, the landmarks give the
 # direction of the goal, but not its distance.
 NOISY_STEP_M: Final = 0.1
+# Bound of the ticks of this step: a body or a wall may be in the way.
+STEP_TICKS: Final = 8
+# A robot that homes again at its slot and is closer to it than this [m], by single readings, averages once.
+HOMED_M: Final = 0.18
 # A move that a wall stops further from the goal than this [m] goes on by odometry: it may pass the wall on its straight way.
 STOPPED_M: Final = 0.15
 # It is in touch with the wall if it was so in one of this many ticks: it may bounce.
@@ -146,6 +150,8 @@ def move(
     passing = _Passing(motion)
     for _ in range(p.drive_ticks_max):
         target = target_point(landmarks, frame.seen, _offset(motion, goal) if knows_way else None, scale_m)
+        if noisy and hop_m == 0.0 and target.distance_m < HOMED_M and not _waits_for_others(target):
+            return (yield from _home_once(motion, landmarks, scale_m))
         approaches = noisy and not target.used_moving_landmarks  # else odometry leads to the goal
         if target.distance_m < (NOISY_NEAR_M if approaches else p.tolerance_m):
             if not approaches:
@@ -258,11 +264,33 @@ def _approach(
             break
         x, y = motion.position
         part = min(1.0, NOISY_STEP_M / max(math.hypot(sx, sy), NOISY_STEP_M))
-        yield from motion.drive_to((x + part * sx, y + part * sy), 0.3 * p.tolerance_m)
+        yield from motion.drive_to((x + part * sx, y + part * sy), 0.3 * p.tolerance_m, STEP_TICKS)
         ex, ey = ex - (frame.x_m - x), ey - (frame.y_m - y)
         if enough and stop > 1:
             break
     return target
+
+
+def _waits_for_others(target: TargetPoint) -> bool:
+    """Return whether too few landmarks stand at their slots, but others that will do so determine the target."""
+    return target.used_moving_landmarks and not target.used_odometry
+
+
+def _home_once(motion: Locomotion, landmarks: Sequence[Landmark], scale_m: float) -> DriveToResult:
+    """Average, and drive to where the landmarks show the slot.
+
+    All landmarks stand, but robots of a single file, of which none has returned to its slot yet, are landmarks of each other.
+    A longer average is no use for them.
+    """
+    frame = motion.frame
+    for _ in range(motion.parameters.stop_samples):
+        yield STOP
+        frame.average()
+    target = target_point(landmarks, frame.averages(), (0.0, 0.0), scale_m)
+    x, y = slide(target.x, target.y, frame.touched)
+    part = min(1.0, NOISY_STEP_M / max(math.hypot(x, y), NOISY_STEP_M))
+    yield from motion.drive_to((frame.x_m + part * x, frame.y_m + part * y), ticks_max=STEP_TICKS)
+    return DriveResult(True, target.used_odometry, target.used_moving_landmarks)
 
 
 def correct(motion: Locomotion, anchors: Sequence[Sighting]) -> DriveToResult:

@@ -143,6 +143,27 @@ def carry_out(robot: BesideDoor, drive: DriveToResult) -> bool:
             return bool(end.value.ok)
 
 
+@pytest.mark.parametrize("still", [False, True])
+def test_a_robot_of_a_single_file_homes_again_by_one_average(still: bool) -> None:
+    """By single readings it would go to and fro until one of them is small by chance."""
+    slot, aside = (1.65, 2.845), (0.945, 0.327)
+    robot = BesideCorner(CORNER, math.pi / 72.0, 0.0, (slot[0] + 0.04 * aside[0], slot[1] + 0.04 * aside[1]))
+    landmarks = tuple(Landmark(node, bearing(slot, ROBOTS[node]), still) for node in (8, 9))
+    drive, ticks = move(robot, 0.0, 0.0, landmarks), 0
+    while True:
+        try:
+            robot.go(next(drive))
+        except StopIteration as end:
+            result = end.value
+            break
+        error_rad = 0.08 * (-1) ** ticks
+        robot.frame.seen |= {8: robot.frame.seen[8] + error_rad, 9: robot.frame.seen[9] - error_rad}
+        ticks += 1
+    assert ticks < 20
+    assert (result.ok, result.used_odometry, result.used_moving_landmarks) == (True, True, not still)
+    assert abs((robot.at[0] - slot[0]) * aside[0] + (robot.at[1] - slot[1]) * aside[1]) < 0.035
+
+
 def test_a_robot_that_stopped_before_its_slot_looks_for_the_robot_ahead() -> None:
     robot = BesideDoor((0.15, 0.0), 0.1)
     assert carry_out(robot, regain(robot, 9, (0.0, 0.0)))
