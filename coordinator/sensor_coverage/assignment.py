@@ -1,8 +1,9 @@
 """Assignment of deployments: the cheapest first, and at the same time all others that do not cross it."""
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Final
 
+from zwerm.agents.sensor_coverage.frontier.attempt_log import AttemptLog
 from zwerm.agents.sensor_coverage.frontier.decisions import FindRoutes
 from zwerm.agents.sensor_coverage.frontier.paths import CheapestRoutes
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
@@ -30,8 +31,9 @@ class CheapestFirst:
     complex. Walks along walls are assigned only where nothing else is, and then those that begin far apart.
     """
 
-    def __init__(self, slots: Slots, pushes_max: int) -> None:
+    def __init__(self, slots: Slots, pushes_max: int, attempts: AttemptLog) -> None:
         self._slots = slots
+        self._attempts = attempts
         self._pushes_max = pushes_max
 
     def assign(
@@ -44,15 +46,8 @@ class CheapestFirst:
         wanted = _wanted(plans, routes, scan.complex_)
         left, chosen = scan.complex_, list[Plan]()
         while len(chosen) < self._pushes_max:
-            reached = [
-                (plan.walk, routes.cost[plan.mover], plan.mover, plan.key, plan)
-                for plan in wanted
-                if plan.mover in routes.cost
-            ]
-            if not reached:
-                break
-            plan = min(reached)[-1]
-            if plan.walk and chosen:
+            plan = next(_by_cost(wanted, routes), None)
+            if plan is None or (plan.walk and chosen):
                 break  # a robot that follows a wall needs standing robots around
             if plan.walk:
                 return self._walks(wanted, scan, sources, find_routes)
@@ -72,23 +67,20 @@ class CheapestFirst:
         """Return plans with paths from stations that cross those of the chosen ones, whose leaders can drive at the same time.
 
         Such a leader waits for the robots behind it, and is no landmark of the robots that move before those. It drives into a
-        gap: walls stop most of these drives. Beside edges the lattice would grow from several places, and need more robots.
+        gap: walls stop most of these drives. Beside edges it does so only where walls stop most of these drives, too. Else the
+        lattice would grow from several places, and need more robots.
         """
+        beside_edges = self._attempts.walls_stop_most
         gone = [plan.path[0] for plan in chosen if plan.path[0] not in scan.bases]
         stations = {slot: cost for slot, cost in sources.items() if slot in scan.bases}
         routes = find_routes(scan.complex_.without(gone), stations)
         found, taken = list[Plan](), dict[int, None]()
         for plan in chosen:
             taken |= self._beside(plan, scan)
-        reached = [
-            (routes.cost[plan.mover], plan.mover, plan.key, plan)
-            for plan in wanted
-            if plan.mover in routes.cost and plan.mover not in scan.bases and not plan.walk and not plan.key[2]
-        ]
-        for *_, plan in sorted(reached):
-            if len(found) == min(WAITING_MAX, self._pushes_max - len(chosen)):
+        for plan in _by_cost(wanted, routes):
+            if plan.walk or len(found) == min(WAITING_MAX, self._pushes_max - len(chosen)):
                 break
-            if plan.mover not in taken:
+            if plan.mover not in taken and plan.mover not in scan.bases and (beside_edges or not plan.key[2]):
                 found.append(plan._replace(path=routes.path(plan.mover), waits=True))
                 taken |= self._beside(found[-1], scan)
         return found
@@ -111,12 +103,9 @@ class CheapestFirst:
         released, released_max = 0, max(1, len(scan.complex_.vertices) // SLOTS_PER_WALK)
         while apart and left and len(chosen) < WALKS_MAX:
             routes = find_routes(scan.complex_, left)
-            reached = [
-                (routes.cost[plan.mover], plan.mover, plan.key, plan) for plan in apart if plan.mover in routes.cost
-            ]
-            if not reached:
+            plan = next(_by_cost(apart, routes), None)
+            if plan is None:
                 break
-            plan = min(reached)[-1]
             apart.remove(plan)
             path = routes.path(plan.mover)
             around = self._around([plan.mover], scan)
@@ -154,6 +143,14 @@ def within(complex_: FlagComplex, slot: int, edges: int) -> dict[int, None]:
         ring = {each: None for slot in ring for each in complex_.neighbours.get(slot, ()) if each not in found}
         found = found | ring
     return found
+
+
+def _by_cost(plans: Iterable[Plan], routes: CheapestRoutes) -> Iterator[Plan]:
+    """Yield the plans with a path, the cheapest first, and walks after all others."""
+    reached = [
+        (plan.walk, routes.cost[plan.mover], plan.mover, plan.key, plan) for plan in plans if plan.mover in routes.cost
+    ]
+    yield from (plan for *_, plan in sorted(reached))
 
 
 def _wanted(plans: Iterable[Sequence[Plan]], routes: CheapestRoutes, complex_: FlagComplex) -> list[Plan]:

@@ -89,7 +89,7 @@ class SensorCoverageCoordinator:
             planner,
             Dijkstra(parameters.obstacle_cost),
             RelativeHomology(),
-            CheapestFirst(self.slots, parameters.pushes_max),
+            CheapestFirst(self.slots, parameters.pushes_max, planner.attempt_log),
             QuiescenceDetector(),
         )
         self.pushing = PushExecution(parameters, self.slots, self.mailbox, self.sources, planner)

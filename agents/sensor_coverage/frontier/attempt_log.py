@@ -1,5 +1,12 @@
 """Deployments that were tried and failed, by slot and side, because robots change their slots."""
 
+from typing import Final
+
+# Weight of a drive beside an edge relative to the next one, in the fraction of those that walls stopped.
+FADING: Final = 0.9
+# Sum of the weights below which too few of them are known.
+DRIVES_MIN: Final = 4.0
+
 # Names one side of an edge, or one gap around a slot.
 Key = tuple[int, ...]
 
@@ -16,12 +23,15 @@ class AttemptLog:
         self.failed: dict[tuple[Key, int], None] = {}
         self.attempts: dict[Key, int] = {}
         self.blocked: dict[int, list[float]] = {} if blocked is None else blocked
+        self._drives = self._stopped = 0.0  # drives beside edges, and those of them that walls stopped, by weight
         self._attempts_max = attempts_max
         self._near_wall_m = near_wall_m
 
     def note_attempt(self, key: Key) -> None:
         """Count an attempt, and close the key after `attempts_max` of them."""
         self.attempts[key] = self.attempts.get(key, 0) + 1
+        if key[2] != 0:
+            self._drives, self._stopped = FADING * self._drives + 1.0, FADING * self._stopped
         if self.attempts[key] >= self._attempts_max:
             self.closed[key] = None
 
@@ -33,8 +43,14 @@ class AttemptLog:
         elsewhere = any((key, end) in self.failed for end in key[:2] if end != mover)
         if driven_m > self._near_wall_m or key[2] == 0 or elsewhere:
             self.closed[key] = None
+        self._stopped += key[2] != 0
         self.failed[key, mover] = None
         self.blocked.setdefault(mover, []).append(direction_rad)
+
+    @property
+    def walls_stop_most(self) -> bool:
+        """True if walls stopped more than a half of the latest drives beside edges: no regular lattice grows there."""
+        return self._drives > DRIVES_MIN and self._stopped > 0.5 * self._drives
 
     def forget_gaps(self) -> None:
         """Forget the attempts at gaps, and that gaps are closed."""

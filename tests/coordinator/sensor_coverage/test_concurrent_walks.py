@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import pytest
 
 from zwerm.agents.runtime.node import Node
+from zwerm.agents.sensor_coverage.frontier.attempt_log import AttemptLog
 from zwerm.agents.sensor_coverage.frontier.paths import CheapestRoutes, Dijkstra
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
@@ -36,7 +37,7 @@ def plans_of(
     def routes(part: FlagComplex, starts: dict[int, float]) -> CheapestRoutes:
         return Dijkstra(3.0).routes(part, starts, ())
 
-    service = CheapestFirst(slots or Slots(), 9)
+    service = CheapestFirst(slots or Slots(), 9, AttemptLog(1, 0.3))
     return service.assign([plans], ScanResult({}, complex_, (0,)), sources, routes)  # type: ignore[arg-type]
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
+from zwerm.agents.sensor_coverage.frontier.attempt_log import AttemptLog
 from zwerm.agents.sensor_coverage.frontier.paths import CheapestRoutes, Dijkstra
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
@@ -176,8 +177,9 @@ def assigned(
     def routes(part: FlagComplex, starts: dict[int, float]) -> CheapestRoutes:
         return Dijkstra(3.0).routes(part, starts, ())
 
-    add = CheapestFirst(Slots(), pushes_max).assign(tiers, ScanResult({}, complex_, ()), sources, routes)  # type: ignore[arg-type]
-    return [each.path for each in add]
+    service = CheapestFirst(Slots(), pushes_max, AttemptLog(1, 0.3))
+    found = service.assign(tiers, ScanResult({}, complex_, ()), sources, routes)  # type: ignore[arg-type]
+    return [each.path for each in found]
 
 
 def test_pushes_from_two_stations_go_at_once_where_their_paths_have_no_landmark_in_common() -> None:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import pytest
 
 from zwerm.agents.runtime.node import Node
+from zwerm.agents.sensor_coverage.frontier.attempt_log import AttemptLog
 from zwerm.agents.sensor_coverage.frontier.paths import CheapestRoutes, Dijkstra
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
@@ -32,8 +33,18 @@ STAR = FlagComplex(
 HALL = "arena.size_m=[4.4,3.6]", "base.pose=[0.2,1.8,0.3]", "robots.count=60"
 
 
+def log_of(drives: str) -> AttemptLog:
+    """Return the log of drives beside edges: each is over the whole hop (+), or a wall stopped it (-)."""
+    log = AttemptLog(1, 0.3)
+    for number, each in enumerate(drives):
+        log.note_attempt((number, number + 1, 1))
+        if each == "-":
+            log.note_failure((number, number + 1, 1), number, 0.0, 0.1)
+    return log
+
+
 def assigned(
-    movers: Sequence[int], pushes_max: int = 9, bases: tuple[int, ...] = (0,), side: int = 0
+    movers: Sequence[int], pushes_max: int = 9, bases: tuple[int, ...] = (0,), side: int = 0, drives: str = ""
 ) -> list[tuple[int, bool]]:
     """Return the mover of each assigned plan, and whether its leader waits."""
 
@@ -41,7 +52,8 @@ def assigned(
         return Dijkstra(3.0).routes(part, starts, ())
 
     plans = [Plan((each, each, side), each, 0.0, 0.95, 0.8, (each,)) for each in movers]
-    found = CheapestFirst(Slots(), pushes_max).assign([plans], ScanResult({}, STAR, bases), {0: 0.0}, routes)  # type: ignore[arg-type]
+    service = CheapestFirst(Slots(), pushes_max, log_of(drives))
+    found = service.assign([plans], ScanResult({}, STAR, bases), {0: 0.0}, routes)  # type: ignore[arg-type]
     assert all(each.path[0] == 0 and each.path[-1] == each.mover for each in found)
     return [(each.mover, each.waits) for each in found]
 
@@ -52,6 +64,23 @@ def test_leaders_of_different_files_drive_at_once_and_those_with_longer_paths_wa
 
 def test_leaders_that_drive_beside_edges_do_so_one_after_the_other() -> None:
     assert assigned([8, 17, 26], side=1) == [(26, False)]
+
+
+@pytest.mark.parametrize(
+    ("drives", "at_once"),
+    [("+++++---", False), ("+--+-----", True), ("----------++++++++", False), ("---", False), ("------", True)],
+)
+def test_they_do_so_at_once_where_walls_stop_most_of_them(drives: str, at_once: bool) -> None:
+    assert log_of(drives).walls_stop_most == at_once
+    assert len(assigned([8, 17, 26], side=1, drives=drives)) == (3 if at_once else 1)
+
+
+def test_drives_into_gaps_do_not_count_for_that() -> None:
+    log = AttemptLog(1, 0.3)
+    for number in range(10):
+        log.note_attempt((number, number, 0))
+        log.note_failure((number, number, 0), number, 0.0, 0.1)
+    assert not log.walls_stop_most
 
 
 def test_a_leader_does_not_drive_beside_the_path_of_an_earlier_push_or_close_to_its_leader() -> None:

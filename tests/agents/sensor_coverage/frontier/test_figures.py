@@ -231,7 +231,8 @@ def figure_9() -> Swarm:
 
 def assigned(swarm: Swarm) -> Plan:
     sources = dict.fromkeys(swarm.scan.bases, 0.0)
-    (plan,) = CheapestFirst(swarm.slots, 9).assign(swarm.planner.plans(), swarm.scan, sources, swarm.routes)
+    service = CheapestFirst(swarm.slots, 9, swarm.planner.attempt_log)
+    (plan,) = service.assign(swarm.planner.plans(), swarm.scan, sources, swarm.routes)
     return plan
 
 
