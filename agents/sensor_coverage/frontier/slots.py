@@ -46,7 +46,8 @@ class Slots:
     `occupant` has the robot at each slot. `heading` [rad] and `frame` are each robot's heading and the robot in whose
     frame it is. `view` has the bearings that each robot sees in its own frame. `walls` and `blocked` have, by slot, the
     directions of walls, and of drives that a wall stopped. `touching` has the directions of the walls that the present occupant
-    touches where it stands: another occupant may stand beside an opening. `near` has the arcs in which a wall close to a slot
+    touches where it stands: another occupant may stand beside an opening. `touched_by` has them for all occupants that the slot
+    ever had, by slot and robot. `near` has the arcs in which a wall close to a slot
     was followed. `walks` are the walls that robots followed. `length_m` has the distances [m] between slots that are not a hop
     apart.
     """
@@ -58,6 +59,7 @@ class Slots:
         self.walls: dict[int, list[float]] = {}
         self.blocked: dict[int, list[float]] = {}
         self.touching: dict[int, list[float]] = {}
+        self.touched_by: dict[tuple[int, int], list[float]] = {}
         self.in_touch: dict[int, tuple[int, ...]] = {}  # the robots that the occupant of a slot touches now
         self.near: dict[int, list[NearArc]] = {}
         self._near_robot: dict[int, int] = {}  # whose way that was, by slot
@@ -113,6 +115,7 @@ class Slots:
         before = self.touching.get(slot, []), self.in_touch.get(slot, ())
         now, robots = list(directions), tuple(robots)
         self.touching[slot], self.in_touch[slot] = now, robots
+        self.touched_by[slot, self.occupant[slot]] = now
         walls = self.walls.setdefault(slot, [])
         added = [each for each in now if add_wall(walls, each)]
         return bool(added) or before != (now, robots)
@@ -187,6 +190,8 @@ class Slots:
             for known in (self.walls, self.blocked, self.touching):
                 if slot in known:
                     known[slot] = [each + by for each in known[slot]]
+            for each in [each for each in self.touched_by if each[0] == slot]:
+                self.touched_by[each] = [there + by for there in self.touched_by[each]]
             self.near[slot] = [
                 each._replace(arc=Arc(each.arc.start_rad + by, each.arc.width_rad)) for each in self.near.get(slot, ())
             ]
@@ -244,12 +249,12 @@ class Slots:
         )
         if origin is not None:
             origin = Origin(origin.slot, turned_vector(origin.at, heading), self.occupant[origin.slot])
-        contacts = {slot: tuple(self.touching.get(slot, ())) for each in points for slot in each.robots}
+        robots = {slot: self.occupant[slot] for each in points for slot in each.robots}
         if after is not None:
             points = tail(self.walks[after].points, JOINED_M) + points
-            contacts = {**self.walks[after].contacts, **contacts}
+            robots |= self.walks[after].robots
         end = slot_of.get(robot) if stays else None
-        self.walks.append(Walk(frame, hand, points, radius_m, end, origin, contacts))
+        self.walks.append(Walk(frame, hand, points, radius_m, end, origin, robots))
         return len(self.walks) - 1
 
     def note_near(self, slot: int, arcs: Sequence[NearArc]) -> None:

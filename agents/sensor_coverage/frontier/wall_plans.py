@@ -65,7 +65,9 @@ class WallPlans:
         for slot in slots.take_replaced():
             self.probed.pop(slot, None)
         touched = {slot: slots.touching.get(slot, ()) for slot in scan.complex_.vertices}
-        stale = proof.update(scan, slots.walks, touched, slots.near, slots.slots_in_touch(), slots.occupant)
+        stale = proof.update(
+            scan, slots.walks, touched, slots.near, slots.slots_in_touch(), slots.occupant, slots.touched_by
+        )
         displaced = slots.take_displaced()
         for slot in (*stale, *displaced):
             self.tried.pop(slot, None)

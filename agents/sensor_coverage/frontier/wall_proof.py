@@ -157,7 +157,7 @@ class Walk(NamedTuple):
     """A stretch of wall that a robot followed, in the frame of one robot; `hand` is +1 if the wall was on the left.
 
     `radius_m` is the radius of its body. `end` is the slot of the walking robot if it stands at the end of the walk. `origin`
-    is the slot that it left, if all points are close to that. `contacts` has what the robots that it touched touched, by slot.
+    is the slot that it left, if all points are close to that. `robots` stood at the slots that it touched.
     """
 
     frame: int
@@ -166,14 +166,12 @@ class Walk(NamedTuple):
     radius_m: float = 0.0
     end: int | None = None
     origin: Origin | None = None
-    contacts: Mapping[int, tuple[float, ...]] = MappingProxyType({})
+    robots: Mapping[int, int] = MappingProxyType({})
 
     def turned(self, frame: int, by: float) -> "Walk":
         """Return the walk in another frame."""
         origin = None if self.origin is None else self.origin._replace(at=turned_vector(self.origin.at, by))
-        contacts = {slot: tuple(each + by for each in walls) for slot, walls in self.contacts.items()}
-        points = tuple(each.turned(by) for each in self.points)
-        return self._replace(frame=frame, points=points, origin=origin, contacts=contacts)
+        return self._replace(frame=frame, points=tuple(each.turned(by) for each in self.points), origin=origin)
 
     def way_from_origin(self) -> Iterator[tuple[float, WalkPoint]]:
         """Yield the direction [rad] of each point from the origin by odometry, and the point."""

@@ -76,6 +76,7 @@ class SwarmProof:
         self._views: dict[int, Mapping[int, float]] = {}  # the directions [rad] of the neighbours, by slot
         self._versions: dict[int, int] = {}  # changes of what a slot sees
         self._triangles = PointTriangles(self._is_proved)
+        self._touched_by: Mapping[tuple[int, int], Sequence[float]] = {}
         self._forget()
 
     def _forget(self) -> None:
@@ -99,15 +100,18 @@ class SwarmProof:
         near: Mapping[int, Sequence[NearArc]],
         in_touch: Mapping[int, Collection[int]],
         occupants: Mapping[int, int] = MappingProxyType({}),
+        touched_by: Mapping[tuple[int, int], Sequence[float]] = MappingProxyType({}),
     ) -> tuple[int, ...]:
         """Take in a scan, all walks, and by slot the directions [rad] of walls in touch and the arcs of walls close to it.
 
-        `in_touch` has the slots whose robots are in touch, and `occupants` the robots by slot.
+        `in_touch` has the slots whose robots are in touch, and `occupants` the robots by slot. `touched_by` has the directions
+        of walls in touch of all robots that a slot has had, by slot and robot.
 
         Return the slots around which points of walks count no more, because a slot that saw them is gone.
         """
         before = self._neighbours
         self._index(walks)
+        self._touched_by = touched_by
         self._bases, self._robots = scan.bases, self._origins.robots_at(occupants)
         complex_ = scan.complex_
         gone = [slot for slot in before if slot not in complex_.neighbours]
@@ -311,7 +315,7 @@ class SwarmProof:
                 crossings.setdefault(stretch, []).extend(crossings_of_step(slot, before, point, hand, loose))
             edges.setdefault(stretch, []).extend(each for each in sight_ends if each.is_loose(self._neighbours))
             for first_number, pocket in pockets:
-                contacts += arcs_beside_pocket(hand, pocket, pocket.contacts)
+                contacts += arcs_beside_pocket(hand, pocket, self._contacts_of(slot, pocket.robot))
                 if pocket.in_touch or (first_number, pocket.is_last) not in beside:
                     beside[first_number, pocket.is_last] = hand, pocket
         for (first_number, _), (hand, pocket) in beside.items():
@@ -327,6 +331,10 @@ class SwarmProof:
             edged += without_edges(each, edges.get(stretch, ()))
         self._edged[slot] = united(edged)
         return united(found)
+
+    def _contacts_of(self, slot: int, robot: int | None) -> Sequence[float]:
+        """Return the directions [rad] of the walls that a robot touches at a slot, or touched when it stood there."""
+        return () if robot is None else self._touched_by.get((slot, robot), ())
 
     def _counts(self, point: WalkPoint) -> bool:
         """Return whether all slots that saw a point of a walk still stand."""

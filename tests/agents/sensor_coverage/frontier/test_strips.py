@@ -43,12 +43,15 @@ def closed_deg(walk: Walk, *standing: int) -> list[tuple[int, int]]:
     return closed_ranges(proof_of(walk, (0, *standing)))
 
 
-def proof_of(walk: Walk, standing: tuple[int, ...], touched_deg: tuple[float, ...] = ()) -> SwarmProof:
-    """Return the proof of these slots, which do not see each other; slot 0 touches walls in these directions [degrees]."""
+def proof_of(walk: Walk, standing: tuple[int, ...], touched_deg: tuple[float, ...] = (), robot: int = 9) -> SwarmProof:
+    """Return the proof of these slots, which do not see each other; slot 0 touches walls in these directions [degrees].
+
+    The `robot` did so at slot 0.
+    """
     views = {each: dict[int, float]() for each in standing}
     proof = SwarmProof()
     touched = {0: tuple(math.radians(each) for each in touched_deg)}
-    proof.update(ScanResult(views, FlagComplex(views), ()), (walk,), touched, {}, {})
+    proof.update(ScanResult(views, FlagComplex(views), ()), (walk,), touched, {}, {}, {}, {(0, robot): touched[0]})
     return proof
 
 
@@ -146,10 +149,9 @@ def test_between_two_contacts_that_no_opening_fits_between_all_is_closed() -> No
 
     Another robot at the slot may stand 0.09 m away, and touch the other side of a passage there.
     """
-    walk = tied(way_to(math.radians(5.0)))
-    touching = walk._replace(contacts={0: (math.radians(-90.0),)})
-    assert closed_ranges(proof_of(touching, (0, 1), (-90.0,))) == [(-135, 1)]
-    assert closed_ranges(proof_of(walk, (0, 1), (-90.0,))) == [(-40, -45), (-135, 1)], "it touched no wall then"
+    walk = tied(way_to(math.radians(5.0)))._replace(robots={0: 8})
+    assert closed_ranges(proof_of(walk, (0, 1), (-90.0,), 8)) == [(-135, 1)]
+    assert closed_ranges(proof_of(walk, (0, 1), (-90.0,), 9)) == [(-40, -45), (-135, 1)]
 
 
 def test_a_contact_on_the_other_side_of_a_robot_closes_nothing_between() -> None:
