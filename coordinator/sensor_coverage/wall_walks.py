@@ -7,7 +7,7 @@ continues from that slot.
 
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import Final
+from typing import Final, NamedTuple
 
 import msgspec
 
@@ -60,6 +60,13 @@ AGAIN_M: Final = 0.03
 DEAD_MAX: Final = 500
 
 
+class SetOut(NamedTuple):
+    """The robots that moved when one set out for a wall, and the legs along walls that it goes on with, if any."""
+
+    moved: Moved
+    legs: Routine[None] | None = None
+
+
 class WallWalks:
     """Walks along walls. `idle` are the slots at which a robot stands after a walk, and is not needed.
 
@@ -96,19 +103,19 @@ class WallWalks:
         while the others stand.
         """
         self._walking = {}
-        moved, legs, together = list[int](), list[Routine[None]](), list[list[Plan]]()
+        gone, together = list[SetOut](), list[list[Plan]]()
         for plan in plans:
             if plan.waits or not together:
                 together.append([])
             together[-1].append(plan)
         for each in together:
             still = [self._still(plan, each) for plan in each]
-            went = [self._set_out(plan, scan, legs, here) for plan, here in zip(each, still, strict=True)]
-            moved += [robot for robots in (yield from run_concurrently(went)) for robot in robots]
-        if legs:
+            going = [self._set_out(plan, scan, here) for plan, here in zip(each, still, strict=True)]
+            gone += yield from run_concurrently(going)
+        if legs := [each.legs for each in gone if each.legs is not None]:
             self._left = self._open(scan)
             yield from run_concurrently(legs)
-        return moved
+        return [robot for each in gone for robot in each.moved]
 
     def _still(self, plan: Plan, together: Iterable[Plan]) -> set[int]:
         """Return the robots that stand at their slots while the robot of one of several plans drives to a wall."""
@@ -116,23 +123,18 @@ class WallWalks:
         going = {occupant.get(slot) for each in together if each is not plan for slot in each.path}
         return {robot for robot in occupant.values() if robot not in self._walking and robot not in going}
 
-    def _set_out(
-        self, plan: Plan, scan: ScanResult, legs: list[Routine[None]], still: Collection[int]
-    ) -> Routine[Moved]:
-        """Let a robot drive to a wall, and the others close up; return those that have moved. Its legs are added to `legs`.
-
-        The robots `still` stand at their slots meanwhile.
-        """
+    def _set_out(self, plan: Plan, scan: ScanResult, still: Collection[int]) -> Routine[SetOut]:
+        """Let a robot drive to a wall, and the others close up. The robots `still` stand at their slots meanwhile."""
         slots, pushing = self._slots, self._pushing
         if any(slot not in slots.occupant for slot in plan.path):  # an earlier walk has lost a robot
-            return ()
+            return SetOut(())
         self._frontier.note_attempt(plan)
         station = plan.mover in pushing.scan.bases
         if station:
             yield from self._sources.let_out(plan.mover, pushing.cycle, pushing.scan.views[plan.mover], ())
             waiting = self._sources.waiting.get(plan.mover)
             if waiting is None:
-                return ()
+                return SetOut(())
             leader = waiting
         else:
             leader = slots.occupant[plan.mover]
@@ -143,12 +145,12 @@ class WallWalks:
         walked = yield from self._order(leader, to_wall)
         if walked is None:  # dead
             self._sources.waiting.pop(plan.mover, None)
-            return (leader,)
+            return SetOut((leader,))
         moving = [robot for robot in slots.occupant.values() if robot not in still]
         self._note_near(leader, plan.mover, walked, -plan.hand, moving)
         if walked.end == SHUT:
             pushing.stopped += 1
-            return (leader,)
+            return SetOut((leader,))
         self._walking[leader] = None
         followers: Sequence[int] = ()
         if station:
@@ -158,20 +160,18 @@ class WallWalks:
         else:
             closed_up = yield from pushing.close_up(plan, leader, there=True)
             if closed_up is None:
-                return (leader,)
+                return SetOut((leader,))
             followers = closed_up[0]
         self.walks += 1
         if walked.end == OPEN:
             if plan.mover in slots.occupant:
                 back = plan.aim + math.pi - heading
                 yield from pushing.correct(leader, [(slots.occupant[plan.mover], back)])
-            return (*followers, leader)
+            return SetOut((*followers, leader))
         keep = (slots.occupant[plan.mover],) if plan.beside and plan.mover in slots.occupant else ()
         meet = tuple(slots.occupant[each] for each in plan.meet if each in slots.occupant)
-        legs.append(
-            self._legs(leader, plan.mover, walked, FollowWall(pushing.cycle, LEG_M, plan.hand, keep, meet), scan)
-        )
-        return (*followers, leader)
+        follow = FollowWall(pushing.cycle, LEG_M, plan.hand, keep, meet)
+        return SetOut((*followers, leader), self._legs(leader, plan.mover, walked, follow, scan))
 
     def probe(self, plans: Sequence[Plan], moving: Collection[int]) -> Routine[Moved]:
         """Let the robot of a slot follow walls close by, in the directions of some plans, and return to its slot.
