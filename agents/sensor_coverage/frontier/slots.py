@@ -115,7 +115,8 @@ class Slots:
         before = self.touching.get(slot, []), self.in_touch.get(slot, ())
         now, robots = list(directions), tuple(robots)
         self.touching[slot], self.in_touch[slot] = now, robots
-        self.touched_by[slot, self.occupant[slot]] = now
+        if slot in self.occupant:
+            self.touched_by[slot, self.occupant[slot]] = now
         walls = self.walls.setdefault(slot, [])
         added = [each for each in now if add_wall(walls, each)]
         return bool(added) or before != (now, robots)
