@@ -47,9 +47,8 @@ class Slots:
     frame it is. `view` has the bearings that each robot sees in its own frame. `walls` and `blocked` have, by slot, the
     directions of walls, and of drives that a wall stopped. `touching` has the directions of the walls that the present occupant
     touches where it stands: another occupant may stand beside an opening. `touched_by` has them for all occupants that the slot
-    ever had, by slot and robot. `near` has the arcs in which a wall close to a slot
-    was followed. `walks` are the walls that robots followed. `length_m` has the distances [m] between slots that are not a hop
-    apart.
+    ever had, by slot and robot. `near` has the arcs in which a wall close to a slot was followed. `walks` are the walls that
+    robots followed. `length_m` has the distances [m] between slots that are not a hop apart.
     """
 
     def __init__(self) -> None:
@@ -191,11 +190,12 @@ class Slots:
             for known in (self.walls, self.blocked, self.touching):
                 if slot in known:
                     known[slot] = [each + by for each in known[slot]]
-            for each in [each for each in self.touched_by if each[0] == slot]:
-                self.touched_by[each] = [there + by for there in self.touched_by[each]]
             self.near[slot] = [
                 each._replace(arc=Arc(each.arc.start_rad + by, each.arc.width_rad)) for each in self.near.get(slot, ())
             ]
+        for (slot, robot), contacts in self.touched_by.items():
+            if slot in turned:
+                self.touched_by[slot, robot] = [each + by for each in contacts]
         for (start, end), way in self._ways.items():
             if start in turned:
                 self._ways[start, end] = turned_vector(way, by)

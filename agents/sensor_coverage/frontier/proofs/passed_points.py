@@ -57,7 +57,7 @@ def passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
             there = stretch_of.get(since) if before is not None else None
             ends = () if here is None or there is None else (there.first, here.last)
             beside = pockets_beside(slot, number, walk.points, stretches) if slot in point.robots else ()
-            robot = walk.robots.get(slot)
+            robot = walk.robots.get(slot, -1)
             pockets = tuple((first + first_number, each._replace(robot=robot)) for first_number, each in beside)
             between = between if before is not None else ()
             edges = tuple(sight_ends_at(slot, number, others, walk.end))

@@ -315,7 +315,7 @@ class SwarmProof:
                 crossings.setdefault(stretch, []).extend(crossings_of_step(slot, before, point, hand, loose))
             edges.setdefault(stretch, []).extend(each for each in sight_ends if each.is_loose(self._neighbours))
             for first_number, pocket in pockets:
-                contacts += arcs_beside_pocket(hand, pocket, self._contacts_of(slot, pocket.robot))
+                contacts += arcs_beside_pocket(hand, pocket, self._touched_by.get((slot, pocket.robot), ()))
                 if pocket.in_touch or (first_number, pocket.is_last) not in beside:
                     beside[first_number, pocket.is_last] = hand, pocket
         for (first_number, _), (hand, pocket) in beside.items():
@@ -331,10 +331,6 @@ class SwarmProof:
             edged += without_edges(each, edges.get(stretch, ()))
         self._edged[slot] = united(edged)
         return united(found)
-
-    def _contacts_of(self, slot: int, robot: int | None) -> Sequence[float]:
-        """Return the directions [rad] of the walls that a robot touches at a slot, or touched when it stood there."""
-        return () if robot is None else self._touched_by.get((slot, robot), ())
 
     def _counts(self, point: WalkPoint) -> bool:
         """Return whether all slots that saw a point of a walk still stand."""

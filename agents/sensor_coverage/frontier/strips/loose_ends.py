@@ -58,7 +58,7 @@ class Pocket(NamedTuple):
     in_touch: bool
     before: StretchEnd | None = None
     end_rad: float | None = None
-    robot: int | None = None
+    robot: int = -1
 
 
 class FollowedStretch(NamedTuple):
