@@ -39,11 +39,11 @@ class PointTriangles:
 
     def _forget(self) -> None:
         self._stretch_of: dict[int, int] = {}  # the number of the first point of the stretch, by the number of a point
-        self._seers: dict[int, dict[int, None]] = {}  # the slots that saw a walk, by the number of its first point
+        self._since: dict[int, int] = {}  # the number of the first point of the first walk that a slot saw
         # The points that a slot saw, each with its walk and its directions [rad].
         self._seen: dict[int, list[tuple[int, WalkPoint, tuple[float, ...]]]] = {}
-        # The points that a slot saw, and another one that saw the same walk did not. They hold for the number of points that
-        # the slot saw.
+        # The points that a slot saw, and another one that stood then did not. They hold for the number of points that the slot
+        # saw.
         self._lost: dict[tuple[int, int], tuple[int, list[_Lost]]] = {}
         # Whether no other slot that saw a lost point is proved, by its number among them, until the proof of a slot changes.
         self._bare: dict[Pair, dict[int, bool]] = {}
@@ -57,7 +57,7 @@ class PointTriangles:
     def add(self, slot: int, number: int, stretch: int, walk: int, point: WalkPoint) -> None:
         """Add a point of a walk that a slot saw; `stretch` and `walk` are the numbers of their first points."""
         self._stretch_of[number] = stretch
-        self._seers.setdefault(walk, {})[slot] = None
+        self._since.setdefault(slot, walk)
         self._seen.setdefault(slot, []).append((walk, point, (point.seen[slot],)))
 
     def add_way(self, slot: int, walk: int, points: Iterable[tuple[float, WalkPoint]]) -> None:
@@ -139,14 +139,17 @@ class PointTriangles:
         return False
 
     def _lost_by(self, slot: int, other: int) -> list[_Lost]:
-        """Return the points that a slot saw, and another one that saw the same walk did not, by their direction [rad]."""
+        """Return the points that a slot saw, and another one that stood then did not, by their direction [rad].
+
+        The other slot stood then if it saw that walk or an earlier one.
+        """
         points = self._seen[slot]
         count, known = self._lost.setdefault((slot, other), (0, []))
         if count != len(points):
             known += (
                 (there % math.tau, tuple(one for one in each.seen.items() if one[0] != slot))
                 for walk, each, directions in points[count:]
-                if other not in each.seen and other in self._seers.get(walk, ())
+                if other not in each.seen and self._since.get(other, math.inf) <= walk
                 for there in directions
             )
             known.sort(key=_DIRECTION)

@@ -142,31 +142,27 @@ def test_a_later_point_of_the_same_stretch_counts() -> None:
 
 
 @pytest.mark.parametrize(
-    ("seen_by_other", "seen_by_third", "third_knows", "counts"),
+    ("walk", "seen_by_third", "third_knows", "counts"),
     [
-        pytest.param(True, False, True, False, id="the other slot lost sight of the walk"),
-        pytest.param(False, False, True, True, id="the other slot may have been empty during the walk"),
-        pytest.param(True, True, True, True, id="a third slot is responsible"),
-        pytest.param(True, True, False, False, id="the third slot is gone, or relies on the other one"),
+        pytest.param(1, False, True, False, id="the other slot lost sight of the walk"),
+        pytest.param(2, False, True, False, id="the other slot saw an earlier walk"),
+        pytest.param(0, False, True, True, id="the other slot may have been empty during the walk"),
+        pytest.param(1, True, True, True, id="a third slot is responsible"),
+        pytest.param(1, True, False, False, id="the third slot is gone, or relies on the other one"),
     ],
 )
-def test_a_point_of_another_walk_behind_a_triangle(
-    seen_by_other: bool, seen_by_third: bool, third_knows: bool, counts: bool
-) -> None:
+def test_a_point_behind_a_triangle(walk: int, seen_by_third: bool, third_knows: bool, counts: bool) -> None:
+    """Slot 0 saw a point of this walk within the angle of its triangle. Slot 1 saw walk 1."""
     views: Views = {0: {1: 0.0}, 1: {0: math.pi}}
     point = WalkPoint({0: math.radians(60.0), 1: math.radians(120.0)}, (math.pi / 2.0,), ())
     behind = WalkPoint({0: math.radians(40.0)} | ({2: 0.5} if seen_by_third else {}), (math.pi / 2.0,), ())
-    before = WalkPoint({0: math.radians(100.0), 1: math.radians(140.0)}, (math.pi / 2.0,), ())
     triangles = PointTriangles(lambda slot, there, other: third_knows and (slot, there, other) == (2, 0.5, 1))
-    triangles.add(0, 0, 0, 0, point)
-    triangles.add(1, 0, 0, 0, point)
+    triangles.add(0, 0, 0, 1, point)
+    triangles.add(1, 0, 0, 1, point)
     at_walls = {(slot, side): True for slot in views for side in (1, -1)}
     neighbours: dict[int, set[int]] = {0: {1}, 1: {0}}
     assert triangles.find(0, point, views, neighbours, dict.fromkeys(views, 1), at_walls) == ((0, 1), (1, 0))
-    triangles.add(0, 1, 1, 1, before)
-    if seen_by_other:
-        triangles.add(1, 1, 1, 1, before)
-    triangles.add(0, 2, 1, 1, behind)
+    triangles.add(0, 1, 1, walk, behind)
     found = triangles.find(0, point, views, neighbours, dict.fromkeys(views, 1), at_walls)
     assert found == (((0, 1), (1, 0)) if counts else ((1, 0),)), "the other slot may rely on the first one"
 
