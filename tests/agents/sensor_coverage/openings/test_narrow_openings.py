@@ -21,6 +21,7 @@ from halls import EXACT, NOISE, UntilInSight, carry_out
             445, True, (EXACT,), id="central, a body in a chicane of 1.6 bodies, where two robots rely on each other"
         ),
         pytest.param(442, True, (NOISE,), id="central, noise, a body in a chicane of 1.4 bodies, and flat triangles"),
+        pytest.param(663, True, (EXACT,), id="central, a door of 1.4 bodies, of which a robot saw one jamb"),
     ],
 )
 def test_a_narrow_opening_is_not_passed_by(seed: int, dies: bool, more: tuple[str, ...]) -> None:
