@@ -15,7 +15,8 @@ class Passed(NamedTuple):
     `number` counts the points of all walks. The slot did not see the points between these two. Each of them was seen by
     other slots. `stretch` is the number of the first point of the stretch of wall, and `ends` are the ends of the wall from the
     point before to this one. `pockets` are set if the walking robot touched the slot's robot beside an end, each with the
-    number of the first point of its stretch. `sight_ends` are set where the slot did not see the next point.
+    number of the first point of its stretch. `sight_ends` are set where the slot did not see the next point, and of them
+    `dark_ends` where no slot saw it.
     """
 
     number: int
@@ -27,6 +28,7 @@ class Passed(NamedTuple):
     ends: tuple[StretchEnd, ...] = ()
     pockets: tuple[tuple[int, Pocket], ...] = ()
     sight_ends: tuple[SightEnd, ...] = ()
+    dark_ends: tuple[SightEnd, ...] = ()
 
 
 def passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
@@ -61,5 +63,6 @@ def passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
             pockets = tuple((first + first_number, each._replace(robot=robot)) for first_number, each in beside)
             between = between if before is not None else ()
             edges = tuple(sight_ends_at(slot, number, others, walk.end))
-            yield slot, Passed(first + number, before, point, walk.hand, between, number_of, ends, pockets, edges)
+            dark = tuple(each for each in sight_ends_at(slot, number, walk.points, walk.end) if not each.witnesses)
+            yield slot, Passed(first + number, before, point, walk.hand, between, number_of, ends, pockets, edges, dark)
             last[slot] = now

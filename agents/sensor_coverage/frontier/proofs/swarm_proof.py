@@ -23,10 +23,9 @@ from zwerm.agents.sensor_coverage.frontier.strips.crossings import (
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import Pocket
 from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import (
     SightEnd,
-    is_passed,
+    edged_arcs,
     shortened,
     with_islands,
-    without_edges,
 )
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     CONTACT_RAD,
@@ -307,13 +306,15 @@ class SwarmProof:
         crossings: dict[int, list[Crossing]] = {}
         beside: dict[tuple[int, bool], tuple[int, Pocket]] = {}  # by stretch and end, with the hand
         edges: dict[int, list[SightEnd]] = {}
-        for _, before, point, hand, between, stretch, ends, pockets, sight_ends in self._passed.get(slot, ()):
+        dark: list[SightEnd] = []
+        for _, before, point, hand, between, stretch, ends, pockets, sight_ends, dark_ends in self._passed.get(slot, ()):
             if not self._counts(point) or (before is not None and not self._counts(before)):
                 continue
             if all(any(each in self._neighbours for each in witnesses) for witnesses in between):
                 loose = [each for each in ends if not each.is_tied(self._neighbours)]
                 crossings.setdefault(stretch, []).extend(crossings_of_step(slot, before, point, hand, loose))
             edges.setdefault(stretch, []).extend(each for each in sight_ends if each.is_loose(self._neighbours))
+            dark += dark_ends
             for first_number, pocket in pockets:
                 contacts += arcs_beside_pocket(hand, pocket, self._touched_by.get((slot, pocket.robot), ()))
                 if pocket.in_touch or (first_number, pocket.is_last) not in beside:
@@ -322,14 +323,8 @@ class SwarmProof:
             is_loose = not pocket.other.is_tied(self._neighbours)
             crossings.setdefault(first_number, []).extend(crossings_of_pocket(hand, pocket, is_loose))
         by_stretch = self._by_stretch[slot] = {number: arcs_into(each) for number, each in crossings.items()}
-        all_edges = [edge for each in edges.values() for edge in each]
-        near = shortened(around.near)
-        edged = without_edges([*contacts, *near], [each for each in all_edges if not is_passed(each, near)])
-        found = [*contacts, *(each.arc for each in around.near)]
-        for stretch, each in by_stretch.items():
-            found += each
-            edged += without_edges(each, edges.get(stretch, ()))
-        self._edged[slot] = united(edged)
+        self._edged[slot] = edged_arcs(by_stretch, edges, contacts, shortened(around.near), dark)
+        found = (*contacts, *(each.arc for each in around.near), *(arc for each in by_stretch.values() for arc in each))
         return united(found)
 
     def _counts(self, point: WalkPoint) -> bool:

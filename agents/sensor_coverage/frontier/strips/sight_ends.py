@@ -2,13 +2,15 @@
 
 At a corner the wall before it and a wall far behind it meet in one direction, and the two together leave no arc open. The
 space behind the corner is the part of a robot that saw the walk there. When no such robot stands, the edge is loose: the
-directions beside it count as closed only where another wall closes them.
+directions beside it count as closed only where another wall closes them. An edge is dark if no slot saw the next point of the
+walk. By the noise of bearings two other walls, one from each side, may reach across it. So one stretch has to close all
+directions beside it.
 
 An edge is open only if nothing beside it is open: a robot that follows a wall into an open arc sees the edge from close by.
 """
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
@@ -92,6 +94,29 @@ def united_round(arcs: Iterable[Arc]) -> list[Arc]:
         reach = max(last.start_rad + last.width_rad, found[0].start_rad + found[0].width_rad + math.tau)
         found[0] = Arc(last.start_rad, min(math.tau, reach - last.start_rad))
     return found
+
+
+def edged_arcs(
+    by_stretch: Mapping[int, Sequence[Arc]],
+    edges: Mapping[int, Sequence[SightEnd]],
+    contacts: Sequence[Arc],
+    near: Sequence[Arc],
+    dark: Iterable[SightEnd],
+) -> list[Arc]:
+    """Return what stretches of wall, contacts, and walls close to the slot close beside edges of sight. The arcs are disjoint.
+
+    `by_stretch` and `edges` have the arcs and the loose edges of each stretch, and `dark` the dark ones of them.
+    """
+    loose = [edge for each in edges.values() for edge in each]
+    found = without_edges([*contacts, *near], [each for each in loose if not is_passed(each, near)])
+    dark = [each for each in dark if not is_passed(each, near)]
+    for stretch, each in by_stretch.items():
+        kept = without_edges(each, edges.get(stretch, ()))
+        found += kept
+        if dark:
+            whole = united_round(kept)
+            dark = [edge for edge in dark if not is_passed(edge, whole)]
+    return united(without_edges(found, dark))
 
 
 def shortened(near: Iterable[NearArc]) -> list[Arc]:

@@ -79,6 +79,19 @@ def test_another_wall_closes_an_edge_of_sight() -> None:
     assert open_at_0((*BEFORE, point()), (point(), *BEYOND), across) == [(330, 150)]
 
 
+@pytest.mark.parametrize(
+    ("behind", "opened"),
+    [
+        pytest.param(point(_2=200), [(330, 150)], id="the slot that saw what is behind it is empty"),
+        pytest.param(point(), [(245, 255), (330, 150)], id="nobody saw what is behind it"),
+    ],
+)
+def test_two_other_walls_that_meet_there_do_not_close_a_dark_edge(behind: WalkPoint, opened: list[tuple[int, int]]) -> None:
+    """The noise of bearings may make walls on both sides of a passage meet."""
+    sides = (point(_0=220), point(_0=235), point(_0=251)), (point(_0=249), point(_0=265), point(_0=280))
+    assert sorted(open_at_0((*BEFORE, behind), (behind, *BEYOND), *sides)) == opened
+
+
 @pytest.mark.parametrize(("hand", "opened"), [(1, [(330, 150)]), (-1, [(245, 250), (330, 150)])])
 def test_a_wall_close_to_a_slot_ends_where_its_robot_turned_back(hand: int, opened: list[tuple[int, int]]) -> None:
     """With the wall at its right hand the robot moved to the left, and nobody saw how the wall goes on there."""
