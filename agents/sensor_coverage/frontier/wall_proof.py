@@ -90,7 +90,8 @@ class WalkPoint(NamedTuple):
 
     `robots` are the slots that the walking robot touches. `at_body` is true if it touches a robot that stands at no slot,
     `left_walls` if it does not follow the wall of the point before any more (`leaves_wall`). `unplaced` are the marks
-    (`mark_of`) of robots without a known slot that see the point. `at` is the robot's place [m] by odometry, in this frame.
+    (`mark_of`) of robots without a known slot that see it. `at` is the robot's place [m] by odometry, in this frame.
+    `was_seen` is true if a slot saw it that counts as if it had not.
     """
 
     seen: Mapping[int, float]
@@ -100,6 +101,7 @@ class WalkPoint(NamedTuple):
     left_walls: bool = False
     unplaced: tuple[int, ...] = ()
     at: tuple[float, float] = (0.0, 0.0)
+    was_seen: bool = False
 
     @property
     def is_blind(self) -> bool:
@@ -113,20 +115,13 @@ class WalkPoint(NamedTuple):
 
     def turned(self, by: float) -> "WalkPoint":
         """Return the same point with all directions turned by an angle [rad]."""
-        return WalkPoint(
-            {slot: each + by for slot, each in self.seen.items()},
-            tuple(each + by for each in self.walls),
-            self.robots,
-            self.at_body,
-            self.left_walls,
-            self.unplaced,
-            turned_vector(self.at, by),
-        )
+        seen = {slot: each + by for slot, each in self.seen.items()}
+        return self._replace(seen=seen, walls=tuple(each + by for each in self.walls), at=turned_vector(self.at, by))
 
     def unseen_by(self, slots: Collection[int]) -> "WalkPoint":
-        """Return the same point as if these slots had not seen it, itself if they have not."""
+        """Return the same point as if these slots had not seen it: itself if they have not."""
         seen = {slot: there for slot, there in self.seen.items() if slot not in slots}
-        return self if len(seen) == len(self.seen) else self._replace(seen=seen)
+        return self if len(seen) == len(self.seen) else self._replace(seen=seen, was_seen=True)
 
 
 class WallStep(NamedTuple):

@@ -11,13 +11,14 @@ An edge is open only if nothing beside it is open: a robot that follows a wall i
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     HAIR_RAD,
     Arc,
     NearArc,
-    WalkPoint,
+    Walk,
     complement,
     contains,
     overlap,
@@ -49,19 +50,35 @@ class SightEnd(NamedTuple):
         return not any(each in standing for each in self.witnesses)
 
 
-def sight_ends_at(slot: int, number: int, points: Sequence[WalkPoint], end: int | None = None) -> Iterator[SightEnd]:
+class SeenEnd(NamedTuple):
+    """An edge of sight of a slot at a walk, and in which directions [rad] other slots saw the next point.
+
+    `beyond` lacks a robot that stands there. Where all slots are known, the edge is dark if none of them saw that point.
+    """
+
+    edge: SightEnd
+    beyond: Mapping[int, float] = MappingProxyType({})
+    is_dark: bool = False
+
+
+def sight_ends_at(slot: int, number: int, walk: Walk) -> Iterator[SeenEnd]:
     """Yield the ends of what a slot saw of a walk, at its point with this number.
 
-    The robot of the slot `end` stands at the end of the walk, because no other one would see it beyond.
+    No other slot relies on what the origin of the walk saw: that counts while its robot stands there. The robot of the slot
+    `end` stands at the end of the walk, because no other one would see it beyond.
     """
+    points, origin = walk.points, None if walk.origin is None else walk.origin.slot
     for step in (1, -1):
         other = number + step
         while 0 <= other < len(points) and points[other].is_blind and slot in points[other].seen:
             other += step
+        there = points[number].seen[slot]
         if 0 <= other < len(points) and slot not in points[other].seen:
-            yield SightEnd(points[number].seen[slot], tuple(points[other].seen))
-        elif other == len(points) and end is not None:
-            yield SightEnd(points[number].seen[slot], (end,))
+            beyond = {each: seen for each, seen in points[other].seen.items() if each != origin}
+            is_dark = not (points[other].seen or points[other].was_seen)
+            yield SeenEnd(SightEnd(there, tuple(beyond)), beyond, is_dark)
+        elif other == len(points) and walk.end is not None:
+            yield SeenEnd(SightEnd(there, (walk.end,)))
 
 
 def without_edges(arcs: Iterable[Arc], ends: Iterable[SightEnd]) -> list[Arc]:
@@ -98,20 +115,19 @@ def united_round(arcs: Iterable[Arc]) -> list[Arc]:
 
 def edged_arcs(
     by_stretch: Mapping[int, Sequence[Arc]],
-    edges: Mapping[int, Sequence[SightEnd]],
+    loose: Mapping[int, Sequence[SeenEnd]],
     contacts: Sequence[Arc],
     near: Sequence[Arc],
-    dark: Iterable[SightEnd],
 ) -> list[Arc]:
     """Return what stretches of wall, contacts, and walls close to the slot close beside edges of sight. The arcs are disjoint.
 
-    `by_stretch` and `edges` have the arcs and the loose edges of each stretch, and `dark` the dark ones of them.
+    `by_stretch` and `loose` have the arcs and the loose edges of each stretch.
     """
-    loose = [edge for each in edges.values() for edge in each]
-    found = without_edges([*contacts, *near], [each for each in loose if not is_passed(each, near)])
-    dark = [each for each in dark if not is_passed(each, near)]
+    hiding = [each for ends in loose.values() for each in ends if not is_passed(each.edge, near)]
+    found = without_edges([*contacts, *near], [each.edge for each in hiding])
+    dark = [each.edge for each in hiding if each.is_dark]
     for stretch, each in by_stretch.items():
-        kept = without_edges(each, edges.get(stretch, ()))
+        kept = without_edges(each, [end.edge for end in loose.get(stretch, ())])
         found += kept
         if dark:
             whole = united_round(kept)

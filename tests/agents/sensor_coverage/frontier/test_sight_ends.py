@@ -7,6 +7,7 @@ import pytest
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.frontier.proofs.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import (
+    SeenEnd,
     SightEnd,
     shortened,
     sight_ends_at,
@@ -14,7 +15,7 @@ from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import (
     with_islands,
     without_edges,
 )
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, Walk, WalkPoint
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, Origin, Walk, WalkPoint
 from zwerm.maths.simplicial import FlagComplex
 
 SOUTH = (-math.pi / 2.0,)
@@ -61,6 +62,30 @@ def test_an_edge_of_sight_is_open_if_nobody_stands_for_what_is_behind_it(
     assert sorted(open_at_0((*BEFORE, behind), (behind, *BEYOND))) == opened
 
 
+@pytest.mark.parametrize(
+    ("walls", "corner", "is_open"),
+    [
+        pytest.param((), point(_0=340, _1=215), True, id="slot 1 may rely on slot 0"),
+        pytest.param((point(_1=180), point(_1=200), point(_1=220)), point(_0=340, _1=215), False, id="walls close it"),
+        pytest.param((), point(_0=340, _1=195), False, id="the triangle does not contain it"),
+        pytest.param((), point(_1=215), False, id="slot 0 did not see the corner of the triangle"),
+    ],
+)
+def test_a_slot_that_may_rely_on_another_one_is_not_responsible_for_the_space_behind_its_edge_of_sight(
+    walls: tuple[WalkPoint, ...], corner: WalkPoint, is_open: bool
+) -> None:
+    """The edges are found again when there is a triangle, or a wall, at the slot that saw the next point."""
+    behind = point(_1=200)
+    known = [Walk(0, -1, each) for each in ((*BEFORE, behind), (behind, *BEYOND))]
+    proof = SwarmProof()
+    for more in (), (corner,), walls:
+        known += [Walk(0, -1, more)] if more else []
+        proof.update(SCAN, known, {}, {}, {})
+        opened = degrees(proof.open_arcs()[0])
+        assert opened == open_at_0(*(each.points for each in known)), "the same as at once"
+    assert ((245, 255) in opened) == is_open
+
+
 @pytest.mark.parametrize(("behind", "proved"), [(point(_1=200), True), (point(), False)])
 def test_no_slot_answers_for_the_space_behind_an_edge_of_sight_that_nobody_saw(behind: WalkPoint, proved: bool) -> None:
     """Two slots that ask a third one, and of which one relies on the other, would rely on each other."""
@@ -86,7 +111,9 @@ def test_another_wall_closes_an_edge_of_sight() -> None:
         pytest.param(point(), [(245, 255), (330, 150)], id="nobody saw what is behind it"),
     ],
 )
-def test_two_other_walls_that_meet_there_do_not_close_a_dark_edge(behind: WalkPoint, opened: list[tuple[int, int]]) -> None:
+def test_two_other_walls_that_meet_there_do_not_close_a_dark_edge(
+    behind: WalkPoint, opened: list[tuple[int, int]]
+) -> None:
     """The noise of bearings may make walls on both sides of a passage meet."""
     sides = (point(_0=220), point(_0=235), point(_0=251)), (point(_0=249), point(_0=265), point(_0=280))
     assert sorted(open_at_0((*BEFORE, behind), (behind, *BEYOND), *sides)) == opened
@@ -116,11 +143,20 @@ def test_a_robot_that_follows_the_wall_close_to_its_slot_past_an_edge_closes_it(
 
 def test_the_ends_of_what_a_slot_saw_are_found_past_points_without_a_contact() -> None:
     blind = WalkPoint({0: 0.5}, (), ())
-    points = [point(_0=10), blind, point(_1=20, _2=30)]
-    assert list(sight_ends_at(0, 0, points)) == [SightEnd(math.radians(10), (1, 2))]
-    assert list(sight_ends_at(0, 0, points[:2])) == [], "the walk ends in sight"
-    assert list(sight_ends_at(0, 1, points[:2], 7)) == [SightEnd(points[1].seen[0], (7,))], "robot 7 stands there"
-    assert list(sight_ends_at(1, 2, points)) == [SightEnd(math.radians(20), (0,))]
+    points = point(_0=10), blind, point(_1=20, _2=30)
+    seen, short = Walk(0, -1, points), Walk(0, -1, points[:2])
+    assert list(sight_ends_at(0, 0, seen)) == [SeenEnd(SightEnd(math.radians(10), (1, 2)), points[2].seen)]
+    assert list(sight_ends_at(0, 0, short)) == [], "the walk ends in sight"
+    assert list(sight_ends_at(0, 1, short._replace(end=7))) == [SeenEnd(SightEnd(0.5, (7,)))], "robot 7 stands there"
+    assert list(sight_ends_at(1, 2, seen)) == [SeenEnd(SightEnd(math.radians(20), (0,)), blind.seen)]
+
+
+def test_no_slot_relies_on_what_the_origin_of_a_walk_saw_and_it_is_not_dark_there() -> None:
+    walk = Walk(0, -1, (point(_0=10), point(_1=20)), origin=Origin(1, (0.0, 0.0)))
+    assert list(sight_ends_at(0, 0, walk)) == [SeenEnd(SightEnd(math.radians(10), ()))]
+    assert list(sight_ends_at(0, 0, Walk(0, -1, (point(_0=10), point())))) == [
+        SeenEnd(SightEnd(math.radians(10), ()), is_dark=True)
+    ]
 
 
 def test_an_edge_is_cut_out_of_the_arcs_of_its_stretch() -> None:

@@ -22,7 +22,9 @@ from halls import EXACT, NOISE, UntilInSight, carry_out
         ),
         pytest.param(442, True, (NOISE,), id="central, noise, a body in a chicane of 1.4 bodies, and flat triangles"),
         pytest.param(663, True, (EXACT,), id="central, a door of 1.4 bodies, of which a robot saw one jamb"),
-        pytest.param(694, True, (NOISE,), id="central, noise, a body in a bend of 1.7 bodies, taken for a robot that stands"),
+        pytest.param(
+            694, True, (NOISE,), id="central, noise, a body in a bend of 1.7 bodies, taken for a robot that stands"
+        ),
     ],
 )
 def test_a_narrow_opening_is_not_passed_by(seed: int, dies: bool, more: tuple[str, ...]) -> None:
