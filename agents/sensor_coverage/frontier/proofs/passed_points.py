@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterator
 from typing import NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import Pocket, StretchEnd
-from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import SeenEnd, sight_ends_at
+from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import SightEnd, dark_ends_at, sight_ends_at
 from zwerm.agents.sensor_coverage.frontier.strips.stretches import pockets_beside, stretches_of
 from zwerm.agents.sensor_coverage.frontier.wall_proof import SeenPoint, TouchCounter, Walk, WalkPoint, point_before
 
@@ -15,7 +15,8 @@ class Passed(NamedTuple):
     `number` counts the points of all walks. The slot did not see the points between these two. Each of them was seen by
     other slots. `stretch` is the number of the first point of the stretch of wall, and `ends` are the ends of the wall from the
     point before to this one. `pockets` are set if the walking robot touched the slot's robot beside an end, each with the
-    number of the first point of its stretch. `sight_ends` are set where the slot did not see the next point.
+    number of the first point of its stretch. `sight_ends` are set where the slot did not see the next point, and of them
+    `dark_ends` where no slot saw it.
     """
 
     number: int
@@ -26,7 +27,8 @@ class Passed(NamedTuple):
     stretch: int = -1
     ends: tuple[StretchEnd, ...] = ()
     pockets: tuple[tuple[int, Pocket], ...] = ()
-    sight_ends: tuple[SeenEnd, ...] = ()
+    sight_ends: tuple[SightEnd, ...] = ()
+    dark_ends: tuple[SightEnd, ...] = ()
 
 
 def passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
@@ -60,6 +62,7 @@ def passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
             robot = walk.robots.get(slot, -1)
             pockets = tuple((first + first_number, each._replace(robot=robot)) for first_number, each in beside)
             between = between if before is not None else ()
-            edges = tuple(sight_ends_at(slot, number, walk))
-            yield slot, Passed(first + number, before, point, walk.hand, between, number_of, ends, pockets, edges)
+            edges = tuple(sight_ends_at(slot, number, others, walk.end))
+            dark = tuple(dark_ends_at(slot, number, walk.points))
+            yield slot, Passed(first + number, before, point, walk.hand, between, number_of, ends, pockets, edges, dark)
             last[slot] = now

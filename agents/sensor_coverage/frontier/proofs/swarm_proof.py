@@ -12,7 +12,6 @@ from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.fans import Pair, side_of
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
-from zwerm.agents.sensor_coverage.frontier.proofs.edged_walls import EdgedWalls, EdgesByStretch, SlotWalls
 from zwerm.agents.sensor_coverage.frontier.proofs.passed_points import Passed, passes
 from zwerm.agents.sensor_coverage.frontier.proofs.point_triangles import PointTriangles
 from zwerm.agents.sensor_coverage.frontier.proofs.walk_origins import WalkOrigins
@@ -22,7 +21,12 @@ from zwerm.agents.sensor_coverage.frontier.strips.crossings import (
     crossings_of_step,
 )
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import Pocket
-from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import shortened, with_islands
+from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import (
+    SightEnd,
+    edged_arcs,
+    shortened,
+    with_islands,
+)
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     CONTACT_RAD,
     Arc,
@@ -81,7 +85,7 @@ class SwarmProof:
         self._around: dict[int, ArcBasis] = {}
         self._followed: dict[int, list[Arc]] = {}  # arcs that end at followed walls or at contacts, by slot
         self._by_stretch: dict[int, dict[int, list[Arc]]] = {}  # of them those of one stretch, by slot and stretch
-        self._edged = EdgedWalls(self._relies)  # the same arcs as `_followed` without edges of sight
+        self._edged: dict[int, list[Arc]] = {}  # the same arcs as `_followed` without edges of sight
         self._chosen: dict[Pair, dict[int, int]] = {}  # the numbers of the points of triangles beside an edge, by side
         self._open_arcs: dict[int, list[Arc]] = {}
         self._alone: dict[Pair, list[Arc]] = {}  # what is closed at the first slot without the second
@@ -154,7 +158,7 @@ class SwarmProof:
                 self._passed.setdefault(slot, []).append(passed)
                 self._triangles.add(slot, passed.number, passed.stretch, len(self._points), passed.point)
                 ends = (*passed.ends, *(pocket.other for _, pocket in passed.pockets))
-                relied = (*passed.between, *(e.ties for e in ends), *(e.edge.witnesses for e in passed.sight_ends))
+                relied = (*passed.between, *(e.ties for e in ends), *(e.witnesses for e in passed.sight_ends))
                 for each in dict.fromkeys(each for witnesses in relied for each in witnesses):
                     self._witnessed.setdefault(each, {})[slot] = None
             self._origins.add(len(self._points), walk)
@@ -171,17 +175,13 @@ class SwarmProof:
             points |= dict.fromkeys(each.number for each in self._passed.get(slot, ()))
             stale |= self._witnessed.get(slot, {})
             self._spoil(slot)
-            for known in (self._around, self._followed, self._by_stretch):
+            for known in (self._around, self._followed, self._by_stretch, self._edged):
                 known.pop(slot, None)
-            self._edged.drop(slot)
-        relying: dict[int, None] = {}
         for slot in stale:
             if slot in self._around:
+                points |= dict.fromkeys(each.number for each in self._passed.get(slot, ()))
                 self._followed[slot] = self._arcs_to_walls(slot)
-                relying |= {slot: None} | self._witnessed.get(slot, {})
-        for slot in self._edged.find_again(relying):
-            points |= dict.fromkeys(each.number for each in self._passed.get(slot, ()))
-            self._spoil(slot)
+                self._spoil(slot)
         self._alone.clear()
         self._triangles.forget_proved()
         for number in points:
@@ -226,7 +226,7 @@ class SwarmProof:
         touched, beside = arcs_of_walls(self._around[slot].touched), self._closed_by_robots(slot)
         opened = complement([*self._followed[slot], *touched, *beside, *fans])
         contacts = touched if slot in self._bases else ()  # a station cannot look behind what it touches
-        return with_islands(opened, [*self._edged.at(slot), *contacts, *beside, *fans])
+        return with_islands(opened, [*self._edged[slot], *contacts, *beside, *fans])
 
     def _closed_without_fans(self, slot: int) -> list[Arc]:
         """Return the arcs of a slot that walls and triangles of robots close."""
@@ -305,14 +305,18 @@ class SwarmProof:
         around, contacts = self._around[slot], arcs_of_walls(self._around[slot].touched, CONTACT_RAD)
         crossings: dict[int, list[Crossing]] = {}
         beside: dict[tuple[int, bool], tuple[int, Pocket]] = {}  # by stretch and end, with the hand
-        edges: EdgesByStretch = {}
-        for _, before, point, hand, between, stretch, ends, pockets, sight_ends in self._passed.get(slot, ()):
+        edges: dict[int, list[SightEnd]] = {}
+        dark: list[SightEnd] = []
+        for _, before, point, hand, between, stretch, ends, pockets, sight_ends, dark_ends in self._passed.get(
+            slot, ()
+        ):
             if not self._counts(point) or (before is not None and not self._counts(before)):
                 continue
             if all(any(each in self._neighbours for each in witnesses) for witnesses in between):
                 loose = [each for each in ends if not each.is_tied(self._neighbours)]
                 crossings.setdefault(stretch, []).extend(crossings_of_step(slot, before, point, hand, loose))
-            edges.setdefault(stretch, []).extend(sight_ends)
+            edges.setdefault(stretch, []).extend(each for each in sight_ends if each.is_loose(self._neighbours))
+            dark += dark_ends
             for first_number, pocket in pockets:
                 contacts += arcs_beside_pocket(hand, pocket, self._touched_by.get((slot, pocket.robot), ()))
                 if pocket.in_touch or (first_number, pocket.is_last) not in beside:
@@ -321,23 +325,9 @@ class SwarmProof:
             is_loose = not pocket.other.is_tied(self._neighbours)
             crossings.setdefault(first_number, []).extend(crossings_of_pocket(hand, pocket, is_loose))
         by_stretch = self._by_stretch[slot] = {number: arcs_into(each) for number, each in crossings.items()}
-        self._edged.take(slot, SlotWalls(by_stretch, contacts, shortened(around.near), edges))
+        self._edged[slot] = edged_arcs(by_stretch, edges, contacts, shortened(around.near), dark)
         found = (*contacts, *(each.arc for each in around.near), *(arc for each in by_stretch.values() for arc in each))
         return united(found)
-
-    def _relies(self, slot: int, there: float, other: int) -> bool | None:
-        """Return whether a slot may rely on another one in a direction [rad]; None if it does not stand.
-
-        It does not if walls close the directions on one side, nor without a triangle of both and a point of a walk.
-        """
-        if slot not in self._neighbours:
-            return None
-        walls = *self._followed[slot], *arcs_of_walls(self._around[slot].touched)
-        view = self._views[slot].get(other)
-        if view is None or any(ends_at(walls, there, side) for side in (1, -1)):
-            return False
-        points = (each.point.seen for each in self._passed.get(slot, ()))
-        return contains((arc_between(view, seen[slot]) for seen in points if other in seen), Arc(there, 0.0))
 
     def _counts(self, point: WalkPoint) -> bool:
         """Return whether all slots that saw a point of a walk still stand."""
@@ -364,7 +354,7 @@ class SwarmProof:
             return False
         known = self._alone.get((slot, other))
         if known is None:
-            walls = *self._edged.at(slot), *arcs_of_walls(self._around[slot].touched)
+            walls = *self._edged.get(slot, ()), *arcs_of_walls(self._around[slot].touched)
             known = self._alone[slot, other] = united([*walls, *self._arcs_between(slot, other)])
         return contains(known, Arc(there, 0.0))
 

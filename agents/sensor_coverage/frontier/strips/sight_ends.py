@@ -11,14 +11,13 @@ An edge is open only if nothing beside it is open: a robot that follows a wall i
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     HAIR_RAD,
     Arc,
     NearArc,
-    Walk,
+    WalkPoint,
     complement,
     contains,
     overlap,
@@ -50,35 +49,33 @@ class SightEnd(NamedTuple):
         return not any(each in standing for each in self.witnesses)
 
 
-class SeenEnd(NamedTuple):
-    """An edge of sight of a slot at a walk, and in which directions [rad] other slots saw the next point.
-
-    `beyond` lacks a robot that stands there. Where all slots are known, the edge is dark if none of them saw that point.
-    """
-
-    edge: SightEnd
-    beyond: Mapping[int, float] = MappingProxyType({})
-    is_dark: bool = False
-
-
-def sight_ends_at(slot: int, number: int, walk: Walk) -> Iterator[SeenEnd]:
+def sight_ends_at(slot: int, number: int, points: Sequence[WalkPoint], end: int | None = None) -> Iterator[SightEnd]:
     """Yield the ends of what a slot saw of a walk, at its point with this number.
 
-    No other slot relies on what the origin of the walk saw: that counts while its robot stands there. The robot of the slot
-    `end` stands at the end of the walk, because no other one would see it beyond.
+    The robot of the slot `end` stands at the end of the walk, because no other one would see it beyond.
     """
-    points, origin = walk.points, None if walk.origin is None else walk.origin.slot
     for step in (1, -1):
-        other = number + step
-        while 0 <= other < len(points) and points[other].is_blind and slot in points[other].seen:
-            other += step
-        there = points[number].seen[slot]
+        other = _beside(slot, number, points, step)
         if 0 <= other < len(points) and slot not in points[other].seen:
-            beyond = {each: seen for each, seen in points[other].seen.items() if each != origin}
-            is_dark = not (points[other].seen or points[other].was_seen)
-            yield SeenEnd(SightEnd(there, tuple(beyond)), beyond, is_dark)
-        elif other == len(points) and walk.end is not None:
-            yield SeenEnd(SightEnd(there, (walk.end,)))
+            yield SightEnd(points[number].seen[slot], tuple(points[other].seen))
+        elif other == len(points) and end is not None:
+            yield SightEnd(points[number].seen[slot], (end,))
+
+
+def dark_ends_at(slot: int, number: int, points: Sequence[WalkPoint]) -> Iterator[SightEnd]:
+    """Yield the ends of what a slot saw of a walk, at its point with this number, where no slot ever saw the next point."""
+    for step in (1, -1):
+        other = _beside(slot, number, points, step)
+        if 0 <= other < len(points) and not points[other].seen and not points[other].was_seen:
+            yield SightEnd(points[number].seen[slot], ())
+
+
+def _beside(slot: int, number: int, points: Sequence[WalkPoint], step: int) -> int:
+    """Return the number of the next point of a walk, or the one before: without a contact it counts only if hidden."""
+    other = number + step
+    while 0 <= other < len(points) and points[other].is_blind and slot in points[other].seen:
+        other += step
+    return other
 
 
 def without_edges(arcs: Iterable[Arc], ends: Iterable[SightEnd]) -> list[Arc]:
@@ -115,19 +112,20 @@ def united_round(arcs: Iterable[Arc]) -> list[Arc]:
 
 def edged_arcs(
     by_stretch: Mapping[int, Sequence[Arc]],
-    loose: Mapping[int, Sequence[SeenEnd]],
+    edges: Mapping[int, Sequence[SightEnd]],
     contacts: Sequence[Arc],
     near: Sequence[Arc],
+    dark: Iterable[SightEnd],
 ) -> list[Arc]:
     """Return what stretches of wall, contacts, and walls close to the slot close beside edges of sight. The arcs are disjoint.
 
-    `by_stretch` and `loose` have the arcs and the loose edges of each stretch.
+    `by_stretch` and `edges` have the arcs and the loose edges of each stretch, and `dark` the dark ones of them.
     """
-    hiding = [each for ends in loose.values() for each in ends if not is_passed(each.edge, near)]
-    found = without_edges([*contacts, *near], [each.edge for each in hiding])
-    dark = [each.edge for each in hiding if each.is_dark]
+    loose = [edge for each in edges.values() for edge in each]
+    found = without_edges([*contacts, *near], [each for each in loose if not is_passed(each, near)])
+    dark = [each for each in dark if not is_passed(each, near)]
     for stretch, each in by_stretch.items():
-        kept = without_edges(each, [end.edge for end in loose.get(stretch, ())])
+        kept = without_edges(each, edges.get(stretch, ()))
         found += kept
         if dark:
             whole = united_round(kept)

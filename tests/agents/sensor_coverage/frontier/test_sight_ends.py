@@ -7,15 +7,15 @@ import pytest
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.frontier.proofs.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import (
-    SeenEnd,
     SightEnd,
+    dark_ends_at,
     shortened,
     sight_ends_at,
     united_round,
     with_islands,
     without_edges,
 )
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, Origin, Walk, WalkPoint
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, Walk, WalkPoint
 from zwerm.maths.simplicial import FlagComplex
 
 SOUTH = (-math.pi / 2.0,)
@@ -60,30 +60,6 @@ def test_an_edge_of_sight_is_open_if_nobody_stands_for_what_is_behind_it(
     behind: WalkPoint, opened: list[tuple[int, int]]
 ) -> None:
     assert sorted(open_at_0((*BEFORE, behind), (behind, *BEYOND))) == opened
-
-
-@pytest.mark.parametrize(
-    ("walls", "corner", "is_open"),
-    [
-        pytest.param((), point(_0=340, _1=215), True, id="slot 1 may rely on slot 0"),
-        pytest.param((point(_1=180), point(_1=200), point(_1=220)), point(_0=340, _1=215), False, id="walls close it"),
-        pytest.param((), point(_0=340, _1=195), False, id="the triangle does not contain it"),
-        pytest.param((), point(_1=215), False, id="slot 0 did not see the corner of the triangle"),
-    ],
-)
-def test_a_slot_that_may_rely_on_another_one_is_not_responsible_for_the_space_behind_its_edge_of_sight(
-    walls: tuple[WalkPoint, ...], corner: WalkPoint, is_open: bool
-) -> None:
-    """The edges are found again when there is a triangle, or a wall, at the slot that saw the next point."""
-    behind = point(_1=200)
-    known = [Walk(0, -1, each) for each in ((*BEFORE, behind), (behind, *BEYOND))]
-    proof = SwarmProof()
-    for more in (), (corner,), walls:
-        known += [Walk(0, -1, more)] if more else []
-        proof.update(SCAN, known, {}, {}, {})
-        opened = degrees(proof.open_arcs()[0])
-        assert opened == open_at_0(*(each.points for each in known)), "the same as at once"
-    assert ((245, 255) in opened) == is_open
 
 
 @pytest.mark.parametrize(("behind", "proved"), [(point(_1=200), True), (point(), False)])
@@ -143,20 +119,21 @@ def test_a_robot_that_follows_the_wall_close_to_its_slot_past_an_edge_closes_it(
 
 def test_the_ends_of_what_a_slot_saw_are_found_past_points_without_a_contact() -> None:
     blind = WalkPoint({0: 0.5}, (), ())
-    points = point(_0=10), blind, point(_1=20, _2=30)
-    seen, short = Walk(0, -1, points), Walk(0, -1, points[:2])
-    assert list(sight_ends_at(0, 0, seen)) == [SeenEnd(SightEnd(math.radians(10), (1, 2)), points[2].seen)]
-    assert list(sight_ends_at(0, 0, short)) == [], "the walk ends in sight"
-    assert list(sight_ends_at(0, 1, short._replace(end=7))) == [SeenEnd(SightEnd(0.5, (7,)))], "robot 7 stands there"
-    assert list(sight_ends_at(1, 2, seen)) == [SeenEnd(SightEnd(math.radians(20), (0,)), blind.seen)]
+    points = [point(_0=10), blind, point(_1=20, _2=30)]
+    assert list(sight_ends_at(0, 0, points)) == [SightEnd(math.radians(10), (1, 2))]
+    assert list(sight_ends_at(0, 0, points[:2])) == [], "the walk ends in sight"
+    assert list(sight_ends_at(0, 1, points[:2], 7)) == [SightEnd(points[1].seen[0], (7,))], "robot 7 stands there"
+    assert list(sight_ends_at(1, 2, points)) == [SightEnd(math.radians(20), (0,))]
 
 
-def test_no_slot_relies_on_what_the_origin_of_a_walk_saw_and_it_is_not_dark_there() -> None:
-    walk = Walk(0, -1, (point(_0=10), point(_1=20)), origin=Origin(1, (0.0, 0.0)))
-    assert list(sight_ends_at(0, 0, walk)) == [SeenEnd(SightEnd(math.radians(10), ()))]
-    assert list(sight_ends_at(0, 0, Walk(0, -1, (point(_0=10), point())))) == [
-        SeenEnd(SightEnd(math.radians(10), ()), is_dark=True)
-    ]
+def test_an_edge_is_dark_where_no_slot_ever_saw_the_next_point() -> None:
+    hidden = point(_2=20)
+    before, after = point(_0=10), point(_0=30)
+    ends = [SightEnd(math.radians(10), ())]
+    assert list(dark_ends_at(0, 0, [before, point(), after])) == ends
+    assert not list(dark_ends_at(0, 0, [before, hidden, after]))
+    assert not list(dark_ends_at(0, 0, [before, hidden.unseen_by((2,)), after])), "the robot of slot 2 has left"
+    assert not list(dark_ends_at(0, 0, [before])), "the walk ends in sight"
 
 
 def test_an_edge_is_cut_out_of_the_arcs_of_its_stretch() -> None:
