@@ -1,6 +1,6 @@
 """The points of a walk along a wall that each slot saw."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from typing import NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import Pocket, StretchEnd
@@ -15,8 +15,8 @@ class Passed(NamedTuple):
     `number` counts the points of all walks. The slot did not see the points between these two. Each of them was seen by
     other slots. `stretch` is the number of the first point of the stretch of wall, and `ends` are the ends of the wall from the
     point before to this one. `pockets` are set if the walking robot touched the slot's robot beside an end, each with the
-    number of the first point of its stretch. `sight_ends` are set where the slot did not see the next point, and of them
-    `dark_ends` where no slot saw it.
+    number of the first point of its stretch. `sight_ends` are set where the slot did not see the next point, and `dark_ends`
+    where no slot saw it, or the robot left the wall at a body.
     """
 
     number: int
@@ -41,6 +41,7 @@ def passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
     stretch_of = stretches_of(walk)
     stretches = list({each.first_number: each for each in stretch_of.values()}.values())
     # No other slot relies on what the origin saw: that counts while its robot stands there.
+    at_bodies = left_at_bodies(walk.points)
     others = walk.points if walk.origin is None else [each.unseen_by((walk.origin.slot,)) for each in walk.points]
     for number, point in enumerate(walk.points):
         touch.take(number, point.walls, point.at_body, point.left_walls)
@@ -64,5 +65,24 @@ def passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
             between = between if before is not None else ()
             edges = tuple(sight_ends_at(slot, number, others, walk.end))
             dark = tuple(dark_ends_at(slot, number, walk.points))
+            if number in at_bodies:
+                dark = (*dark, SightEnd(point.seen[slot], ()))
             yield slot, Passed(first + number, before, point, walk.hand, between, number_of, ends, pockets, edges, dark)
             last[slot] = now
+
+
+def left_at_bodies(points: Sequence[WalkPoint]) -> set[int]:
+    """Return the numbers of the points of a walk between which the robot left a wall at a body, and came to another one.
+
+    Between them may be an opening that the body fills. A slot that looks along it sees both walls in one direction.
+    """
+    touch, found = TouchCounter(), set[int]()
+    latest, at_body = -1, False
+    for number, point in enumerate(points):
+        touch.take(number, point.walls, point.at_body, point.left_walls)
+        at_body = at_body or point.at_body
+        if point.walls:
+            if latest >= 0 and at_body and touch.since > latest:
+                found |= {latest, number}
+            latest, at_body = number, point.at_body
+    return found

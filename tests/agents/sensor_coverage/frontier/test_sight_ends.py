@@ -5,6 +5,7 @@ import math
 import pytest
 
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
+from zwerm.agents.sensor_coverage.frontier.proofs.passed_points import left_at_bodies
 from zwerm.agents.sensor_coverage.frontier.proofs.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import (
     SightEnd,
@@ -46,6 +47,7 @@ def open_at_0(*walks: tuple[WalkPoint, ...], near: tuple[NearArc, ...] = ()) -> 
 
 BEFORE = point(_0=150), point(_0=200), point(_0=250)
 BEYOND = point(_0=250), point(_0=290), point(_0=330)
+AT_BODY = WalkPoint({0: math.radians(250)}, (), (), at_body=True)
 
 
 @pytest.mark.parametrize(
@@ -134,6 +136,31 @@ def test_an_edge_is_dark_where_no_slot_ever_saw_the_next_point() -> None:
     assert not list(dark_ends_at(0, 0, [before, hidden, after]))
     assert not list(dark_ends_at(0, 0, [before, hidden.unseen_by((2,)), after])), "the robot of slot 2 has left"
     assert not list(dark_ends_at(0, 0, [before])), "the walk ends in sight"
+
+
+@pytest.mark.parametrize(
+    ("between", "left"),
+    [
+        pytest.param((), set(), id="the same wall"),
+        pytest.param((AT_BODY,), {1, 3}, id="a body, then another wall"),
+        pytest.param((AT_BODY, AT_BODY, AT_BODY, AT_BODY), {1, 6}, id="a long way round a body"),
+        pytest.param((point()._replace(walls=()),), set(), id="a corner"),
+    ],
+)
+def test_a_robot_that_leaves_a_wall_at_a_body_may_have_passed_an_opening(
+    between: tuple[WalkPoint, ...], left: set[int]
+) -> None:
+    other = point(_0=40)._replace(walls=(math.pi,) if between else SOUTH)
+    assert left_at_bodies((point(_0=10), point(_0=20), *between, other, point(_0=50))) == left
+
+
+@pytest.mark.parametrize(("between", "opened"), [(AT_BODY, [(245, 255), (330, 150)]), (None, [(330, 150)])])
+def test_two_walls_that_meet_where_a_robot_left_one_at_a_body_leave_an_arc_open(
+    between: WalkPoint | None, opened: list[tuple[int, int]]
+) -> None:
+    """A slot that looks along an opening sees the walls on both sides of it in one direction."""
+    round_it = () if between is None else (between,)
+    assert sorted(open_at_0((*BEFORE, *round_it, *(each._replace(walls=(math.pi,)) for each in BEYOND)))) == opened
 
 
 def test_an_edge_is_cut_out_of_the_arcs_of_its_stretch() -> None:
