@@ -53,8 +53,13 @@ class UntilInSight(NullProgress):
             raise KeyboardInterrupt
 
 
-def carry_out(seed: int, dies: bool, more: tuple[str, ...], watcher: NullProgress | None = None) -> RunResult:
-    """Run a small building with a narrow opening. Longer runs belong to `benchmarks/algorithms/bench_openings.py`."""
+def carry_out(
+    seed: int, dies: bool, more: tuple[str, ...], watcher: NullProgress | None = None, run_seed: int | None = None
+) -> RunResult:
+    """Run a small building with a narrow opening. Longer runs belong to `benchmarks/algorithms/bench_openings.py`.
+
+    `run_seed` is the seed of the run, that of the building if it is None.
+    """
     building = small_building(seed)
     settings = (
         *building.settings(),
@@ -62,4 +67,5 @@ def carry_out(seed: int, dies: bool, more: tuple[str, ...], watcher: NullProgres
         "robots.count=30",
         "time.duration_s=2000.0",
     )
-    return run("sensor-coverage-narrow", seed, "inline", (*settings, *more), watcher=watcher)
+    run_seed = seed if run_seed is None else run_seed
+    return run("sensor-coverage-narrow", run_seed, "inline", (*settings, *more), watcher=watcher)

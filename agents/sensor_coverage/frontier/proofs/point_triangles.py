@@ -162,7 +162,8 @@ def _crosses(pair: Pair, point: WalkPoint, views: Views, neighbours: Mapping[int
     """Return whether the line from the second slot to the point crosses a side of a triangle of robots with both slots.
 
     The second slot relies on that triangle, and on the first slot for what is beyond this side. So the first does not rely on
-    the second.
+    the second. Nor does it where the line passes so close to the first slot that it may cross the side there: in such a flat
+    triangle nearly a half turn at the first slot is that of the second one.
     """
     slot, other = pair
     here, there = views[slot], views[other]
@@ -170,6 +171,12 @@ def _crosses(pair: Pair, point: WalkPoint, views: Views, neighbours: Mapping[int
     return any(
         third in beyond
         and is_between(here[third], to_other, to_point, HIDDEN_MIN_RAD)
-        and is_between(point.seen[other], there[slot], there[third], HIDDEN_MIN_RAD)
+        and _is_between_or_close(point.seen[other], there[slot], there[third])
         for third in neighbours[slot]
     )
+
+
+def _is_between_or_close(there: float, slot: float, third: float) -> bool:
+    """Return whether a direction is between those of a slot and a third one [rad], or close to that of the slot."""
+    close = abs(math.remainder(there - slot, math.tau)) < HIDDEN_MIN_RAD
+    return close or is_between(there, slot, third, HIDDEN_MIN_RAD)

@@ -49,7 +49,10 @@ def searched(point: WalkPoint, points: list[WalkPoint], views: Views, neighbours
             ]
             if any(HIDDEN_MIN_RAD < off < width - HIDDEN_MIN_RAD for off in offs) or any(
                 is_between(views[slot][third], views[slot][other], point.seen[slot], HIDDEN_MIN_RAD)
-                and is_between(point.seen[other], views[other][slot], views[other][third], HIDDEN_MIN_RAD)
+                and (
+                    is_between(point.seen[other], views[other][slot], views[other][third], HIDDEN_MIN_RAD)
+                    or abs(math.remainder(point.seen[other] - views[other][slot], math.tau)) < HIDDEN_MIN_RAD
+                )
                 for third in neighbours[slot] & neighbours[other]
             ):
                 more.add((slot, other))
@@ -232,3 +235,25 @@ def test_a_triangle_across_a_side_of_one_of_robots_does_not_count_where_that_sid
     neighbours = {slot: set(seen) for slot, seen in views.items()}
     found = triangles.find(0, point, views, neighbours, dict.fromkeys(views, 1), at_walls)
     assert set(found) == {(1, 0)} | (set() if with_third else {(0, 1)})
+
+
+@pytest.mark.parametrize(("third", "counts"), [((), True), ((2,), False)])
+def test_a_flat_triangle_over_a_triangle_of_robots_does_not_count_at_its_middle(
+    third: tuple[int, ...], counts: bool
+) -> None:
+    """The line from slot 1 to the point passes slot 0 at 1.8 degrees, on the side of slot 2."""
+    directions = {0: {1: -149.8, 2: -82.2}, 1: {0: 30.1, 2: -40.5}, 2: {0: 97.7, 1: 139.4}}
+    point = WalkPoint({0: math.radians(22.7), 1: math.radians(28.3)}, (0.0,), ())
+    standing = {0, 1, *third}
+    views = {
+        slot: {other: math.radians(each) for other, each in seen.items() if other in standing}
+        for slot, seen in directions.items()
+        if slot in standing
+    }
+    at_walls = {(slot, side): True for slot in point.seen for side in (1, -1)}
+    neighbours = {slot: set(seen) for slot, seen in views.items()}
+    triangles = PointTriangles(lambda slot, there, other: False)
+    for slot in point.seen:
+        triangles.add(slot, 0, 0, 0, point)
+    found = triangles.find(0, point, views, neighbours, dict.fromkeys(views, 1), at_walls)
+    assert ((0, 1) in found) is counts

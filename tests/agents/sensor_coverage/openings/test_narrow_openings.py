@@ -32,6 +32,20 @@ def test_a_narrow_opening_is_not_passed_by(seed: int, dies: bool, more: tuple[st
     assert result.outcome != "completed" or result.metrics["reachable_coverage_fraction"] >= 0.98
 
 
+@pytest.mark.parametrize(
+    ("seed", "run_seed", "more"),
+    [
+        pytest.param(694, 11, (NOISE,), id="noise, a body in a bend of 1.7 bodies, along which a robot looks"),
+        pytest.param(445, 2, (EXACT,), id="a body in a chicane of 1.6 bodies, and a flat triangle over one of robots"),
+    ],
+)
+def test_a_narrow_opening_is_not_passed_by_with_other_seeds_of_the_run(
+    seed: int, run_seed: int, more: tuple[str, ...]
+) -> None:
+    result = carry_out(seed, True, more, UntilInSight(), run_seed)
+    assert result.outcome != "completed" or result.metrics["reachable_coverage_fraction"] >= 0.98
+
+
 def test_a_robot_that_did_not_reach_its_slot_in_a_passage_gets_one_where_it_stands() -> None:
     """Without a slot it fills the passage, and no path leads to the robots beyond."""
     result = carry_out(22, False, (EXACT,))
