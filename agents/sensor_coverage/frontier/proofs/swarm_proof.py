@@ -215,14 +215,14 @@ class SwarmProof:
 
     def _open_without(self, slot: int, pair: Pair | None, side: int) -> list[Arc]:
         """Return the arcs of a slot that are open without the triangle on one side of an edge."""
-        view, fans = self._views[slot], list[Arc]()
+        fans = list[Arc]()
         for other in self._neighbours[slot]:
             its_pair = _pair_of(slot, other)
             numbers = self._choose(its_pair)
             kept = (number for its_side, number in numbers.items() if its_pair != pair or its_side != side)
             for each in kept:
                 if (slot, other) in self._triangles.pairs(each):
-                    fans += self._origins.arcs_of_triangle(slot, each, self._points[each], view[other])
+                    fans += self._origins.arcs_of_triangle((slot, other), each, self._points[each], self._views)
         touched, beside = arcs_of_walls(self._around[slot].touched), self._closed_by_robots(slot)
         opened = complement([*self._followed[slot], *touched, *beside, *fans])
         contacts = touched if slot in self._bases else ()  # a station cannot look behind what it touches

@@ -87,12 +87,17 @@ class WalkOrigins:
         if known is not None and known.slot == slot:
             yield from (each for each in known.directions if side_of(known.point, slot, each) == side)
 
-    def arcs_of_triangle(self, slot: int, number: int, point: WalkPoint, other_rad: float) -> Iterator[Arc]:
-        """Yield the arcs at a slot that its triangle with a point and another slot, in the direction [rad], closes.
+    def arcs_of_triangle(self, pair: Pair, number: int, point: WalkPoint, views: Views) -> Iterator[Arc]:
+        """Yield the arcs at the first slot of a pair that its triangle with a point and the other slot closes.
 
-        It goes on to the walls touched at the point, on the side away from the other slot.
+        It goes on to the walls touched at the point, on the side away from the other slot. It does not if the noise of bearings
+        shows the two slots the point on different sides of their line: along a wall each may rely on the other beyond the end of
+        its own part.
         """
-        there = point.seen[slot]
-        yield arc_between(other_rad, there)
-        for each in self.touched(slot, number, -side_of(point, slot, other_rad)):
-            yield arc_between(there, each)
+        slot, other = pair
+        to_other, there = views[slot][other], point.seen[slot]
+        yield arc_between(to_other, there)
+        side = side_of(point, slot, to_other)
+        if side != side_of(point, other, views[other][slot]):
+            for each in self.touched(slot, number, -side):
+                yield arc_between(there, each)
