@@ -15,8 +15,8 @@ class Passed(NamedTuple):
     `number` counts the points of all walks. The slot did not see the points between these two. Each of them was seen by
     other slots. `stretch` is the number of the first point of the stretch of wall, and `ends` are the ends of the wall from the
     point before to this one. `pockets` are set if the walking robot touched the slot's robot beside an end, each with the
-    number of the first point of its stretch. `sight_ends` are set where the slot did not see the next point, and `dark_ends`
-    where no slot saw it, or the robot left the wall at a body.
+    number of the first point of its stretch. `sight_ends` are set where the slot did not see the next point. `dark_ends` are
+    the same with the origin of the walk among the slots that saw it, and those where the robot left the wall at a body.
     """
 
     number: int

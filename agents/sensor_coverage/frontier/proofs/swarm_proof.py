@@ -158,7 +158,8 @@ class SwarmProof:
                 self._passed.setdefault(slot, []).append(passed)
                 self._triangles.add(slot, passed.number, passed.stretch, len(self._points), passed.point)
                 ends = (*passed.ends, *(pocket.other for _, pocket in passed.pockets))
-                relied = (*passed.between, *(e.ties for e in ends), *(e.witnesses for e in passed.sight_ends))
+                witnesses = (each.witnesses for each in (*passed.sight_ends, *passed.dark_ends))
+                relied = (*passed.between, *(each.ties for each in ends), *witnesses)
                 for each in dict.fromkeys(each for witnesses in relied for each in witnesses):
                     self._witnessed.setdefault(each, {})[slot] = None
             self._origins.add(len(self._points), walk)
@@ -316,7 +317,7 @@ class SwarmProof:
                 loose = [each for each in ends if not each.is_tied(self._neighbours)]
                 crossings.setdefault(stretch, []).extend(crossings_of_step(slot, before, point, hand, loose))
             edges.setdefault(stretch, []).extend(each for each in sight_ends if each.is_loose(self._neighbours))
-            dark += dark_ends
+            dark += (each for each in dark_ends if each.is_loose(self._neighbours))
             for first_number, pocket in pockets:
                 contacts += arcs_beside_pocket(hand, pocket, self._touched_by.get((slot, pocket.robot), ()))
                 if pocket.in_touch or (first_number, pocket.is_last) not in beside:

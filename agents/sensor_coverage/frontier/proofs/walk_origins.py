@@ -91,7 +91,7 @@ class WalkOrigins:
         """Yield the arcs at the first slot of a pair that its triangle with a point and the other slot closes.
 
         It goes on to the walls touched at the point, on the side away from the other slot. It does not if the noise of bearings
-        shows the two slots the point on different sides of their line: along a wall each may rely on the other beyond the end of
+        shows the two slots the point on different sides of their line: along a wall each may rely on the other past the end of
         its own part.
         """
         slot, other = pair

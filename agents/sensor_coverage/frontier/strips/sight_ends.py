@@ -2,9 +2,9 @@
 
 At a corner the wall before it and a wall far behind it meet in one direction, and the two together leave no arc open. The
 space behind the corner is the part of a robot that saw the walk there. When no such robot stands, the edge is loose: the
-directions beside it count as closed only where another wall closes them. An edge is dark if no slot saw the next point of the
-walk. By the noise of bearings two other walls, one from each side, may reach across it. So one stretch has to close all
-directions beside it.
+directions beside it count as closed only where another wall closes them. An edge is dark if no slot stands that saw the
+next point of the walk, not even the one at which the walk began. By the noise of bearings two other walls, one from each
+side, may reach across it. So one stretch has to close all directions beside it.
 
 An edge is open only if nothing beside it is open: a robot that follows a wall into an open arc sees the edge from close by.
 """
@@ -63,11 +63,11 @@ def sight_ends_at(slot: int, number: int, points: Sequence[WalkPoint], end: int 
 
 
 def dark_ends_at(slot: int, number: int, points: Sequence[WalkPoint]) -> Iterator[SightEnd]:
-    """Yield the ends of what a slot saw of a walk, at its point with this number, where no slot ever saw the next point."""
+    """Yield the ends of what a slot saw of a walk, at its point with this number, with all slots that saw the next point."""
     for step in (1, -1):
         other = _beside(slot, number, points, step)
-        if 0 <= other < len(points) and not points[other].seen and not points[other].was_seen:
-            yield SightEnd(points[number].seen[slot], ())
+        if 0 <= other < len(points) and slot not in points[other].seen and not points[other].was_seen:
+            yield SightEnd(points[number].seen[slot], tuple(points[other].seen))
 
 
 def _beside(slot: int, number: int, points: Sequence[WalkPoint], step: int) -> int:

@@ -85,8 +85,9 @@ def test_another_wall_closes_an_edge_of_sight() -> None:
 @pytest.mark.parametrize(
     ("behind", "opened"),
     [
-        pytest.param(point(_2=200), [(330, 150)], id="the slot that saw what is behind it is empty"),
-        pytest.param(point(), [(245, 255), (330, 150)], id="nobody saw what is behind it"),
+        pytest.param(point(_1=200), [(330, 150)], id="slot 1 saw what is behind it"),
+        pytest.param(point(_2=200), [(245, 255), (330, 150)], id="the slot that saw it is empty"),
+        pytest.param(point(), [(245, 255), (330, 150)], id="nobody saw it"),
     ],
 )
 def test_two_other_walls_that_meet_there_do_not_close_a_dark_edge(
@@ -128,13 +129,12 @@ def test_the_ends_of_what_a_slot_saw_are_found_past_points_without_a_contact() -
     assert list(sight_ends_at(1, 2, points)) == [SightEnd(math.radians(20), (0,))]
 
 
-def test_an_edge_is_dark_where_no_slot_ever_saw_the_next_point() -> None:
+def test_a_slot_that_saw_the_next_point_counts_for_a_dark_edge_also_if_the_walk_began_there() -> None:
     hidden = point(_2=20)
     before, after = point(_0=10), point(_0=30)
-    ends = [SightEnd(math.radians(10), ())]
-    assert list(dark_ends_at(0, 0, [before, point(), after])) == ends
-    assert not list(dark_ends_at(0, 0, [before, hidden, after]))
-    assert not list(dark_ends_at(0, 0, [before, hidden.unseen_by((2,)), after])), "the robot of slot 2 has left"
+    assert list(dark_ends_at(0, 0, [before, point(), after])) == [SightEnd(math.radians(10), ())]
+    assert list(dark_ends_at(0, 0, [before, hidden, after])) == [SightEnd(math.radians(10), (2,))]
+    assert not list(dark_ends_at(0, 0, [before, hidden.unseen_by((2,)), after])), "the robot of slot 2 has moved"
     assert not list(dark_ends_at(0, 0, [before])), "the walk ends in sight"
 
 
