@@ -1,17 +1,22 @@
 """Sensor coverage in small drawn buildings with openings as narrow as a body: whether `completed` is true.
 
-The seed draws the building (`benchmarks/common/small_buildings.py`), the pose of the base, and the noise of odometry. Each
-building is run with and without a coordinator, and with and without a robot that dies in an opening. A run is *right* if it
-is `completed` with a reachable coverage of at least 0.98, and *false* if it is `completed` with less. Every other run
-ended as `failed`, with its reason, or at the time limit.
+The seed draws the building (`benchmarks/common/small_buildings.py`) and the pose of the base, the seed of the run draws the
+noise of odometry and bearings. Each building is run with and without a coordinator, and with and without a robot that dies
+in an opening. A run is *right* if it is `completed` with a reachable coverage of at least 0.98, and *false* if it is
+`completed` with less. Every other run ended as `failed`, with its reason, or at the time limit.
 
     python -m benchmarks.algorithms.bench_openings --rows rows.csv --seeds 1 20
     python -m benchmarks.algorithms.bench_openings --rows rows.csv --variant decentralised --noise 0.0436332 --death yes
+    python -m benchmarks.algorithms.bench_openings --rows rows.csv --seeds 694 694 --run-seeds 1 12 --until-in-sight
+
+With `--until-in-sight` a run ends as `in sight` once 0.98 of its building has been in sight for half a minute. A false
+`completed` comes before, so that false runs are found in less time.
 
 With `--rows FILE` each run is stored when it ends, and runs that are stored are not repeated.
 """
 
 import argparse
+import itertools
 import time
 from collections.abc import Iterator, Sequence
 from typing import Final
@@ -21,6 +26,7 @@ import msgspec
 from benchmarks.common.campaign import add_campaign_options, carry_out, grouped
 from benchmarks.common.csv_rows import write_csv
 from benchmarks.common.small_buildings import small_building
+from benchmarks.common.until_in_sight import UntilInSight
 from benchmarks.common.verdicts import ENOUGH, VARIANTS, verdict
 from zwerm import run
 
@@ -30,38 +36,46 @@ DURATION_S: Final = 3000.0
 
 
 class Case(msgspec.Struct, frozen=True):
-    """One run: its seed, the noise of bearings [rad], whether a robot dies in an opening, and its variant."""
+    """One run: the seeds of its building and of the run, the noise of bearings [rad], whether a robot dies, its variant."""
 
     seed: str
+    run_seed: str
     noise_rad: str
     death: str
     variant: str
 
 
 def cases(asked: argparse.Namespace) -> Iterator[Case]:
-    """Yield the runs that are asked for, with the seed as the slowest index."""
-    for seed in range(asked.seeds[0], asked.seeds[1] + 1):
-        for noise in asked.noise:
-            for death in asked.death:
-                for variant in asked.variant:
-                    yield Case(str(seed), f"{noise:g}", death, variant)
+    """Yield the runs that are asked for, with the building as the slowest index. The seed of a run is that of its building
+    unless others are asked for.
+    """
+    for seed in _between(asked.seeds):
+        run_seeds = _between(asked.run_seeds or (seed, seed))
+        for run_seed, noise, death, variant in itertools.product(run_seeds, asked.noise, asked.death, asked.variant):
+            yield Case(str(seed), str(run_seed), f"{noise:g}", death, variant)
 
 
-def one_run(case: Case, more: Sequence[str]) -> dict[str, str]:
-    """Carry out one run, and return its row."""
+def _between(bounds: Sequence[int]) -> range:
+    first, last = bounds
+    return range(first, last + 1)
+
+
+def one_run(case: Case, more: Sequence[str], until_in_sight: bool = False) -> dict[str, str]:
+    """Carry out one run, to its end or until nearly all is in sight, and return its row."""
     building = small_building(int(case.seed))
     settings = [*building.settings(), "robots.count=30", f"time.duration_s={DURATION_S}"]
     settings += [f"robots.sensors.0.sd_rad={case.noise_rad}", *VARIANTS[case.variant], *more]
     if case.death == "yes":
         settings.append(building.death())
     began = time.process_time()
-    result = run("sensor-coverage-narrow", seed=int(case.seed), runner="inline", overrides=settings)
+    watcher = UntilInSight() if until_in_sight else None
+    result = run("sensor-coverage-narrow", int(case.run_seed), "inline", settings, watcher=watcher)
     seen = result.metrics["reachable_coverage_fraction"]
     return {
         **msgspec.structs.asdict(case),
         "joints": building.joints,
         "narrowest_m": f"{building.narrowest_m:.4f}",
-        "verdict": verdict(result.outcome, seen),
+        "verdict": "in sight" if watcher is not None and watcher.is_in_sight else verdict(result.outcome, seen),
         "died": f"{1 - result.metrics['faults_missed']:g}" if case.death == "yes" else "0",
         "reachable_coverage": f"{seen:.4f}",
         "robots": f"{result.metrics['robots_deployed']:g}",
@@ -105,9 +119,11 @@ def main() -> None:
     parser.add_argument("--variant", choices=VARIANTS, nargs="+", default=list(VARIANTS))
     parser.add_argument("--noise", type=float, nargs="+", default=[0.0, 0.0436332], metavar="RAD", help="of bearings")
     parser.add_argument("--death", choices=("no", "yes"), nargs="+", default=["no", "yes"])
+    parser.add_argument("--run-seeds", type=int, nargs=2, metavar=("FIRST", "LAST"), help="of each building's runs")
+    parser.add_argument("--until-in-sight", action="store_true", help="end a run once 0.98 of its building is in sight")
     add_campaign_options(parser, last_seed=2)
     asked = parser.parse_args()
-    rows = carry_out(asked, cases(asked), lambda case: one_run(case, asked.set))
+    rows = carry_out(asked, cases(asked), lambda case: one_run(case, asked.set, asked.until_in_sight))
     write_csv(asked.csv, summary(rows))
 
 

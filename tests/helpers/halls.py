@@ -7,7 +7,7 @@ from zwerm.agents.runtime.node import Node
 from zwerm.deploy.node_specs import node_specs
 from zwerm.link.memory import MemoryLink
 from zwerm.run.assembly import assemble
-from zwerm.run.progress import NullProgress
+from zwerm.run.progress import ProgressListener
 from zwerm.run.result import RunResult
 from zwerm.run.runner import run
 from zwerm.scenario.tables import Scenario
@@ -37,24 +37,8 @@ def drive(
     return outcome, world
 
 
-class UntilInSight(NullProgress):
-    """Interrupts a run once its robots have seen nearly all of the arena for half a minute: then `completed` is no false word.
-
-    It is for tests in which a run may not end before. The campaigns of `benchmarks/algorithms` judge whole runs.
-    """
-
-    def __init__(self) -> None:
-        self._samples = 0
-
-    def covered(self, fraction: float, robots: int) -> None:
-        """Count the samples in a row, one every 5 s, with all but 2 % of the arena in sight."""
-        self._samples = self._samples + 1 if fraction >= 0.98 else 0
-        if self._samples > 6:
-            raise KeyboardInterrupt
-
-
 def carry_out(
-    seed: int, dies: bool, more: tuple[str, ...], watcher: NullProgress | None = None, run_seed: int | None = None
+    seed: int, dies: bool, more: tuple[str, ...], watcher: ProgressListener | None = None, run_seed: int | None = None
 ) -> RunResult:
     """Run a small building with a narrow opening. Longer runs belong to `benchmarks/algorithms/bench_openings.py`.
 

@@ -1,9 +1,9 @@
 """A robot dies in an opening, and beyond it is space: `completed` must not be said while that is unseen."""
 
 import pytest
-from halls import UntilInSight
 
 from benchmarks.common.small_buildings import CrashInOpening
+from benchmarks.common.until_in_sight import UntilInSight
 from zwerm.run.runner import run
 
 

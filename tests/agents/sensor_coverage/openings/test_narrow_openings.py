@@ -1,7 +1,9 @@
 """Drawn buildings in which a narrow opening was passed by: `completed` must not be said while the space behind it is unseen."""
 
 import pytest
-from halls import EXACT, NOISE, UntilInSight, carry_out
+from halls import EXACT, NOISE, carry_out
+
+from benchmarks.common.until_in_sight import UntilInSight
 
 
 @pytest.mark.parametrize(

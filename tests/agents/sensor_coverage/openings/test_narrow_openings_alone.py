@@ -1,7 +1,9 @@
 """Without a coordinator, `completed` must not be said either while the space behind a narrow opening is unseen."""
 
 import pytest
-from halls import EXACT, NOISE, UntilInSight, carry_out
+from halls import EXACT, NOISE, carry_out
+
+from benchmarks.common.until_in_sight import UntilInSight
 
 ALONE = (EXACT, "services.path=gradient")
 WITNESS = ("services.path=gradient", "time.duration_s=600.0")
