@@ -57,9 +57,9 @@ def fan_of(
             if all(closed[a, side] or (a, side) in beyond for a, b in (pair, pair[::-1]) for side in wanted[a, b])
         ]
         if len(kept) == len(pairs):
-            # A triangle that is flat at a slot, and on different sides of the point by the two slots' bearings, may by noise be
-            # on the other side of the slot: it would rely on the other one for a space that lies on its own side.
-            found = tuple((a, b) for a, b in kept if sides[a, b] != sides[b, a] or not _is_flat(point, a, views[a][b]))
+            # A triangle that is flat at a slot may by noise be on the other side of it. And the other slot looks along its
+            # sides into the space beyond, and may not see an opening there.
+            found = tuple((a, b) for a, b in kept if not _is_flat(point, a, views[a][b]))
             hidden = () if is_hidden is None else dict.fromkeys(each for each in found if is_hidden(each))
             if not hidden:
                 return found

@@ -3,7 +3,7 @@
 from collections.abc import Collection, Iterator, Sequence
 from typing import NamedTuple
 
-from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import Pocket, StretchEnd
+from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStretch, Pocket, StretchEnd
 from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import SightEnd, dark_ends_at, sight_ends_at
 from zwerm.agents.sensor_coverage.frontier.strips.stretches import pockets_beside, stretches_of
 from zwerm.agents.sensor_coverage.frontier.wall_proof import SeenPoint, TouchCounter, Walk, WalkPoint, point_before
@@ -17,6 +17,7 @@ class Passed(NamedTuple):
     point before to this one. `pockets` are set if the walking robot touched the slot's robot beside an end, each with the
     number of the first point of its stretch. `sight_ends` are set where the slot did not see the next point. `dark_ends` are
     the same with the origin of the walk among the slots that saw it, and those where the robot left the wall at a body.
+    `ties` are the slots that tie an end of the stretch at this point.
     """
 
     number: int
@@ -29,6 +30,7 @@ class Passed(NamedTuple):
     pockets: tuple[tuple[int, Pocket], ...] = ()
     sight_ends: tuple[SightEnd, ...] = ()
     dark_ends: tuple[SightEnd, ...] = ()
+    ties: tuple[int, ...] = ()
 
 
 def passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
@@ -67,8 +69,19 @@ def passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
             dark = tuple(dark_ends_at(slot, number, walk.points))
             if number in at_bodies:
                 dark = (*dark, SightEnd(point.seen[slot], ()))
-            yield slot, Passed(first + number, before, point, walk.hand, between, number_of, ends, pockets, edges, dark)
+            ties = () if here is None else _ties_at(number, here)
+            yield (
+                slot,
+                Passed(first + number, before, point, walk.hand, between, number_of, ends, pockets, edges, dark, ties),
+            )
             last[slot] = now
+
+
+def _ties_at(number: int, stretch: FollowedStretch) -> tuple[int, ...]:
+    """Return the slots that tie an end of a stretch at the point with this number of its walk."""
+    first = stretch.first.ties if number == stretch.first_number else ()
+    last = stretch.last.ties if number == stretch.last_number else ()
+    return (*first, *last)
 
 
 def left_at_bodies(points: Sequence[WalkPoint]) -> set[int]:

@@ -18,9 +18,14 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import WalkPoint, arc_betw
 # A point of a walk lies within a triangle's angle only if it is this far from its sides: bearings have noise.
 HIDDEN_MIN_RAD: Final = math.radians(2.0)
 
+# Directions of an arc are tested this far [rad] apart.
+CLOSED_STEP_RAD: Final = math.radians(3.0)
+
 Views = Mapping[int, Mapping[int, float]]
 # The direction [rad] of a point from a slot, and the other slots that saw it, with theirs.
 _Lost = tuple[float, tuple[tuple[int, float], ...]]
+# The directions [rad] of an end of a stretch from a slot that ties it and from another one, and all slots that tie it.
+_Tied = tuple[float, float, tuple[int, ...]]
 _DIRECTION: Final = itemgetter(0)
 
 
@@ -45,6 +50,8 @@ class PointTriangles:
         # The points that a slot saw, and another one that stood then did not. They hold for the number of points that the slot
         # saw.
         self._lost: dict[tuple[int, int], tuple[int, list[_Lost]]] = {}
+        # The ends of stretches that a slot ties and another one sees, by these two: the directions [rad] from both, the ties.
+        self._tied: dict[Pair, list[_Tied]] = {}
         # Whether no other slot that saw a lost point is proved, by its number among them, until the proof of a slot changes.
         self._bare: dict[Pair, dict[int, bool]] = {}
 
@@ -59,6 +66,12 @@ class PointTriangles:
         self._stretch_of[number] = stretch
         self._since.setdefault(slot, walk)
         self._seen.setdefault(slot, []).append((walk, point, (point.seen[slot],)))
+
+    def add_tied(self, slot: int, point: WalkPoint, ties: tuple[int, ...]) -> None:
+        """Add an end of a stretch at a point that a slot saw, and the slots that tie it."""
+        for each in ties:
+            if each != slot and each in point.seen:
+                self._tied.setdefault((each, slot), []).append((point.seen[each], point.seen[slot], ties))
 
     def add_way(self, slot: int, walk: int, points: Iterable[tuple[float, WalkPoint]]) -> None:
         """Add the points of a walk that began at a slot, and their directions [rad] from there, also those out of its sight.
@@ -101,7 +114,7 @@ class PointTriangles:
         """
         basis = [(slot, versions[slot]) for slot in point.seen if slot in neighbours], at_walls, close
         if self._basis.get(number) == basis and not any(
-            self._hides(pair, point, views) for pair in self._pairs[number]
+            self._hides(pair, point, views) or self._ties(pair, point, views) for pair in self._pairs[number]
         ):
             return self._pairs[number]
         self._basis[number] = basis
@@ -111,7 +124,11 @@ class PointTriangles:
             neighbours,
             at_walls,
             close,
-            lambda each: self._hides(each, point, views) or _crosses(each, point, views, neighbours),
+            lambda each: (
+                self._hides(each, point, views)
+                or self._ties(each, point, views)
+                or _crosses(each, point, views, neighbours)
+            ),
         )
         return pairs
 
@@ -138,6 +155,28 @@ class PointTriangles:
                 return True
         return False
 
+    def _ties(self, pair: Pair, point: WalkPoint, views: Views) -> bool:
+        """Return whether the first slot alone ties an end of a stretch beyond the line from the second slot to a point.
+
+        The second slot relies on it for what is behind that end. So the first does not rely on the second, unless walls or
+        triangles of robots without the second one close all directions behind the end anyway.
+        """
+        slot, other = pair
+        to_other, to_slot, here, there = views[slot][other], views[other][slot], point.seen[slot], point.seen[other]
+        return any(
+            is_between(here_end, to_other, here, HIDDEN_MIN_RAD)
+            and is_between(there, to_slot, there_end, HIDDEN_MIN_RAD)
+            and all(each == slot or each not in views for each in ties)
+            and not self._is_closed(slot, here_end, there_end, other)
+            for here_end, there_end, ties in self._tied.get(pair, ())
+        )
+
+    def _is_closed(self, slot: int, a_rad: float, b_rad: float, other: int) -> bool:
+        """Return whether all directions of a slot between two others [rad] are proved without another slot."""
+        off = math.remainder(b_rad - a_rad, math.tau)
+        count = math.ceil(abs(off) / CLOSED_STEP_RAD) or 1
+        return all(self._is_proved(slot, a_rad + off * each / count, other) for each in range(count + 1))
+
     def _lost_by(self, slot: int, other: int) -> list[_Lost]:
         """Return the points that a slot saw, and another one that stood then did not, by their direction [rad].
 
@@ -163,20 +202,21 @@ def _crosses(pair: Pair, point: WalkPoint, views: Views, neighbours: Mapping[int
 
     The second slot relies on that triangle, and on the first slot for what is beyond this side. So the first does not rely on
     the second. Nor does it where the line passes so close to the first slot that it may cross the side there: in such a flat
-    triangle nearly a half turn at the first slot is that of the second one.
+    triangle nearly a half turn at the first slot is that of the second one. By the noise of bearings the second slot may even
+    see the point on the other side of the first. So it is where the third slot is straight behind the second one.
     """
     slot, other = pair
     here, there = views[slot], views[other]
-    beyond, to_other, to_point = neighbours[other], here[other], point.seen[slot]
+    to_point = math.remainder(point.seen[slot] - here[other], math.tau)
+    aside = math.remainder(point.seen[other] - there[slot], math.tau)
     return any(
-        third in beyond
-        and is_between(here[third], to_other, to_point, HIDDEN_MIN_RAD)
-        and _is_between_or_close(point.seen[other], there[slot], there[third])
+        _is_before(math.remainder(here[third] - here[other], math.tau), to_point, -HIDDEN_MIN_RAD)
+        and _is_before(aside, math.remainder(there[third] - there[slot], math.tau))
         for third in neighbours[slot]
+        if third in neighbours[other]
     )
 
 
-def _is_between_or_close(there: float, slot: float, third: float) -> bool:
-    """Return whether a direction is between those of a slot and a third one [rad], or close to that of the slot."""
-    close = abs(math.remainder(there - slot, math.tau)) < HIDDEN_MIN_RAD
-    return close or is_between(there, slot, third, HIDDEN_MIN_RAD)
+def _is_before(angle: float, limit: float, least: float = -math.pi) -> bool:
+    """Return whether an angle [rad] is smaller than a limit, on its side. On the other side it may be as large as `least`."""
+    return least < math.copysign(1.0, limit) * angle < abs(limit) - HIDDEN_MIN_RAD

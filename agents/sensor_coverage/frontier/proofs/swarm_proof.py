@@ -157,6 +157,7 @@ class SwarmProof:
             for slot, passed in passes(walk, len(self._points)):
                 self._passed.setdefault(slot, []).append(passed)
                 self._triangles.add(slot, passed.number, passed.stretch, len(self._points), passed.point)
+                self._triangles.add_tied(slot, passed.point, passed.ties)
                 ends = (*passed.ends, *(pocket.other for _, pocket in passed.pockets))
                 witnesses = (each.witnesses for each in (*passed.sight_ends, *passed.dark_ends))
                 relied = (*passed.between, *(each.ties for each in ends), *witnesses)
@@ -308,7 +309,7 @@ class SwarmProof:
         beside: dict[tuple[int, bool], tuple[int, Pocket]] = {}  # by stretch and end, with the hand
         edges: dict[int, list[SightEnd]] = {}
         dark: list[SightEnd] = []
-        for _, before, point, hand, between, stretch, ends, pockets, sight_ends, dark_ends in self._passed.get(
+        for _, before, point, hand, between, stretch, ends, pockets, sight_ends, dark_ends, _ in self._passed.get(
             slot, ()
         ):
             if not self._counts(point) or (before is not None and not self._counts(before)):
