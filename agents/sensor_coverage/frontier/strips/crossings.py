@@ -36,6 +36,8 @@ from zwerm.agents.sensor_coverage.motion.homing import unit
 OVERHANG: Final = 1.0
 # An opening narrower than this many diameters of a body need not be found.
 PASSABLE: Final = 1.3
+# A bearing's error [rad]: twice its noise.
+BEARING_RAD: Final = math.radians(5.0)
 
 
 def crossings_of_step(
@@ -103,7 +105,8 @@ def arcs_beside_pocket(hand: int, pocket: Pocket, contacts: Iterable[float]) -> 
         if _is_in_front(pocket):
             yield arc_between(direction_of(place, touched), direction_of(place, beyond))
         for each in contacts:
-            yield from _arc_between_walls(pocket, touched_point(place, each, radius_m))
+            if not _are_at_corners(pocket, wall, each):
+                yield from _arc_between_walls(pocket, touched_point(place, each, radius_m))
     if pocket.before is not None:
         yield from _arc_between_walls(pocket, pocket.before.touched)
 
@@ -116,6 +119,17 @@ def _is_in_front(pocket: Pocket) -> bool:
     """
     (x, y), (at_x, at_y), (wall_x, wall_y) = pocket.place, pocket.end.at, pocket.end.touched
     return (x - wall_x) * (at_x - wall_x) + (y - wall_y) * (at_y - wall_y) > 0.0
+
+
+def _are_at_corners(pocket: Pocket, wall_rad: float, contact_rad: float) -> bool:
+    """Return whether the two robots touch walls in one direction [rad], but not one wall: they stand before two corners.
+
+    Robots in touch with one wall and each other stand along it. A switch is 30 degrees wide.
+    """
+    if abs(math.remainder(wall_rad - contact_rad, math.tau)) > CONTACT_RAD:
+        return False
+    along_rad = direction_of(pocket.place, pocket.end.at)
+    return abs(math.cos(along_rad - wall_rad)) > math.sin(CONTACT_RAD + BEARING_RAD)
 
 
 def _arc_between_walls(pocket: Pocket, other: Vector) -> Iterator[Arc]:

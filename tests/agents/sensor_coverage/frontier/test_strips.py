@@ -181,6 +181,25 @@ def test_a_robot_between_the_end_of_a_way_and_the_wall_makes_no_pocket(wall_deg:
     assert (pocket_of(stretch, 0, (0.14, 0.0), 0.0) is not None) == bool(pockets)
 
 
+@pytest.mark.parametrize(
+    ("to_walking_deg", "closed"),
+    [
+        pytest.param(60.0, 2, id="both robots stand along one wall"),
+        pytest.param(78.0, 2, id="the same with an error of a switch and of a bearing"),
+        pytest.param(85.0, 1, id="before the corners of a door"),
+    ],
+)
+def test_two_robots_that_touch_walls_in_one_direction_may_stand_before_two_corners(
+    to_walking_deg: float, closed: int
+) -> None:
+    """Both touch a wall at -30 degrees. One arc is a body's radius of the wall that the walking robot touched."""
+    wall, there = math.radians(-30.0), math.radians(to_walking_deg)
+    at = 2.0 * RADIUS_M * math.cos(there), 2.0 * RADIUS_M * math.sin(there)
+    end = StretchEnd(at, touched_point(at, wall, RADIUS_M))
+    pocket = Pocket(end, end, RADIUS_M, False, (0.0, 0.0), True)
+    assert len(list(arcs_beside_pocket(-1, pocket, (wall,)))) == closed
+
+
 def test_close_ends_of_two_stretches_close_what_is_between_them_for_the_robot_beside() -> None:
     """The walking robot follows a wall to the tip of a corner, where a robot stands, and goes round that robot."""
     first = StretchEnd((0.05, 0.13), (0.1, 0.08))
