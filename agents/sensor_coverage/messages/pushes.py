@@ -77,7 +77,7 @@ class SlotMemory(_PushMessagePart, frozen=True):
     `claims` is the number of its newest claim. `obstructed` has (key of an attempt, dead robot whose body stopped it).
     `explored` are directions [rad] of attempts to follow a wall, and `probed` those of probes of walls close by.
     `proved` has the arcs that walks closed. `distances_m` has (neighbouring slot, distance [m]) where a walk measured it.
-    `edges` has the edges of sight.
+    `edges` has the edges of sight. `ways` has (slot, x, y): the way [m] in the base's frame by which a robot came from there.
     """
 
     slot: int
@@ -94,6 +94,7 @@ class SlotMemory(_PushMessagePart, frozen=True):
     distances_m: tuple[tuple[int, float], ...] = ()
     probed: tuple[float, ...] = ()
     edges: tuple[LostSight, ...] = ()
+    ways: tuple[tuple[int, float, float], ...] = ()
 
 
 # The robots of a push, rear to front, each as (slot before the push, robot).

@@ -9,6 +9,7 @@ from collections.abc import Callable, Generator
 from typing import Final
 
 from zwerm.agents.runtime.contract import Setup
+from zwerm.agents.sensor_coverage.frontier.directions import DISPLACED_M_MIN
 from zwerm.agents.sensor_coverage.motion.homing import Vector, slide
 from zwerm.agents.sensor_coverage.motion.motion_parameters import RobotParameters
 from zwerm.agents.sensor_coverage.motion.odometry_frame import OdometryFrame
@@ -92,13 +93,22 @@ class Locomotion:
         away_m = math.hypot(self.frame.x_m - self.rest[0], self.frame.y_m - self.rest[1])
         return away_m > 2.0 * self.parameters.tolerance_m
 
-    def return_to_rest(self, rest: Vector) -> Generator[BodyVelocity, None, Vector]:
-        """Drive back to the point of rest if the robot was displaced; return the new point of rest, if a wall is there."""
+    def return_to_rest(
+        self, rest: Vector, on_displaced: Callable[[], None] = lambda: None
+    ) -> Generator[BodyVelocity, None, Vector]:
+        """Drive back to the point of rest if the robot was displaced; return the new point of rest, if a wall is there.
+
+        Call `on_displaced` once if the robot is so far away that it does not see what it saw there.
+        """
+        is_known = False
         tolerance_m = self.parameters.tolerance_m
         for _ in range(RETURN_TICKS_MAX):
             dx, dy = rest[0] - self.frame.x_m, rest[1] - self.frame.y_m
             if math.hypot(dx, dy) < tolerance_m:
                 return rest
+            if math.hypot(dx, dy) > DISPLACED_M_MIN and not is_known:
+                is_known = True
+                on_displaced()
             dx, dy = slide(dx, dy, self.frame.touched)
             if math.hypot(dx, dy) < tolerance_m:
                 break

@@ -85,8 +85,16 @@ class LocalMap(NeighbourTable):
                 there, back = self.seen[node].bearing_rad + self.heading, self._back(node) or 0.0
                 distance_m = self.distances_m.get(state.slot, math.inf)
                 if self._references.take(node, state.slot, numbers, there, back, distance_m):
-                    self.proof.inherit(())
-                    self._planner.walls.forget()
+                    self._forget_walls()
+
+    def note_way(self, slot: int, way: tuple[float, float]) -> None:
+        """Note the way (x, y) [m] from a slot to this one in the base's frame: it may show that this robot stands elsewhere."""
+        if self._references.take_way(slot, way):
+            self._forget_walls()
+
+    def _forget_walls(self) -> None:
+        self.proof.inherit(())
+        self._planner.walls.forget()
 
     def update_walls(self, bearings: tuple[float, ...], robots: tuple[int, ...] = ()) -> None:
         """Remember the walls that this robot touches, by their bearings [rad], and the robots."""
@@ -115,6 +123,7 @@ class LocalMap(NeighbourTable):
             tuple(self.distances_m.items()),
             tuple(self._planner.walls.probed.get(me, ())),
             self.proof.edges(),
+            tuple((slot, *way) for slot, way in self._references.ways.items()),
         )
 
     def reopen(self) -> None:
@@ -189,7 +198,7 @@ class LocalMap(NeighbourTable):
         """Take over a slot with its memory."""
         self._take(memory.slot, memory.claims)
         me = self.slot
-        self._references = References(memory.references)
+        self._references = References(memory.references, memory.ways)
         self._slots.walls[me] = list(memory.walls)
         log = self._planner.attempt_log
         log.closed = dict.fromkeys(memory.closed)

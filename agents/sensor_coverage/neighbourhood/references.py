@@ -1,17 +1,29 @@
-"""The reference directions from one robot's slot to the slots around."""
+"""The reference directions from one robot's slot to the slots around, and the ways from there."""
 
 import cmath
+import math
 from collections.abc import Callable, Iterable
 
-from zwerm.agents.sensor_coverage.frontier.directions import Reference, is_displaced, refined_reference
+from zwerm.agents.sensor_coverage.frontier.directions import (
+    DISPLACED_M_MIN,
+    Reference,
+    is_displaced,
+    refined_reference,
+)
 from zwerm.agents.sensor_coverage.messages.pushes import ReferenceBearing
 
 
 class References:
-    """The reference directions from one robot's slot, by the slots to which they lead."""
+    """The reference directions from one robot's slot, by the slots to which they lead.
 
-    def __init__(self, inherited: Iterable[ReferenceBearing] = ()) -> None:
+    `ways` has by slot the way (x, y) [m] by which a robot came from there: the first robot, or the first displaced one.
+    """
+
+    def __init__(
+        self, inherited: Iterable[ReferenceBearing] = (), ways: Iterable[tuple[int, float, float]] = ()
+    ) -> None:
         """Begin with those of the former robot at the slot."""
+        self.ways: dict[int, tuple[float, float]] = {slot: (x_m, y_m) for slot, x_m, y_m in ways}
         self._known: dict[int, Reference] = {
             each.slot: (cmath.rect(1.0, each.direction_rad), each.count) for each in inherited
         }
@@ -35,6 +47,17 @@ class References:
         self._learned[node], self._readers[slot] = numbers, node
         self._known[slot] = refined_reference(known, there_rad, back_rad)
         return displaced
+
+    def take_way(self, slot: int, way: tuple[float, float]) -> bool:
+        """Take the way from a slot; return whether it shows that this robot stands elsewhere than a former one.
+
+        A robot displaced along its lines of sight, or together with others, sees these in the same directions.
+        """
+        known = self.ways.setdefault(slot, way)
+        if math.dist(known, way) <= DISPLACED_M_MIN:
+            return False
+        self.ways[slot] = way
+        return True
 
     def memory(self, at: Callable[[int], int | None]) -> tuple[ReferenceBearing, ...]:
         """Return the references for the next robot at the slot; `at` returns the robot at a slot, or None."""

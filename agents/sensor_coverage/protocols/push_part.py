@@ -100,6 +100,7 @@ class PushPart:
         self._back = back if self._chain.is_rear else self._chain.behind
         self._memory: SlotMemory | None = None
         self._ahead_rad: float | None = None  # the bearing of the robot ahead at its slot
+        self._start: tuple[float, float] | None = None  # of the move to the slot ahead, by odometry
         self._plan: Plan | None = None
         self._led_at = situation.tick
         self._behind_rad: float | None = None  # the bearing of the follower at this robot's slot

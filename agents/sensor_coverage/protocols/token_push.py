@@ -24,6 +24,7 @@ from typing import Any, Final, NamedTuple
 import msgspec
 
 from zwerm.agents.sensor_coverage.frontier.directions import wrapped
+from zwerm.agents.sensor_coverage.frontier.wall_proof import turned_vector
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.agents.sensor_coverage.messages.commands import NearWalls, Sighting
 from zwerm.agents.sensor_coverage.messages.pushes import (
@@ -201,6 +202,7 @@ class TokenPush(PushPart, LeadPush, WallPush):
         self._map.inherit(memory)
         self._map.distances_m |= measured
         hop_m = 0.0 if bearing_rad is None else self._map.distances_m.get(origin, self._map.parameters.hop_m)
+        self._start = self._situation.motion.position
         self._situation.move(bearing_rad or 0.0, hop_m, landmarks, knows_way=bearing_rad is not None)
 
     # --- after the drive ----------------------------------------------------------------------------------------------
@@ -285,6 +287,9 @@ class TokenPush(PushPart, LeadPush, WallPush):
         """Stand at the new slot, and inform the robot ahead; the leader ends the push."""
         self._situation.stand()
         ahead = self._chain.ahead
+        if self._start is not None and self._chain.origin != NOWHERE:
+            x_m, y_m = (now - then for now, then in zip(self._situation.motion.position, self._start, strict=True))
+            self._map.note_way(self._chain.origin, turned_vector((x_m, y_m), self._heading))
         if ahead is None:
             self.close(PushDone(self.id))
             return

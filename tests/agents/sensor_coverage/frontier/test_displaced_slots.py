@@ -7,6 +7,8 @@ import pytest
 
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, Walk, WalkPoint
+from zwerm.agents.sensor_coverage.messages.pushes import ReferenceBearing
+from zwerm.agents.sensor_coverage.neighbourhood.references import References
 
 EAST = math.radians(10.0)
 FAR_OFF, CLOSE = math.radians(25.0), math.radians(15.0)
@@ -116,3 +118,25 @@ def test_walls_close_by_are_forgotten_where_a_new_robot_stands_beside_its_slot(o
     assert (1 in slots.near) is remains
     assert slots.walks is walks, "walls farther off are seen in nearly the same directions"
     assert slots.take_displaced() == ()
+
+
+@pytest.mark.parametrize(
+    ("ways", "displaced"),
+    [
+        pytest.param(((0.5, 0.0), (0.45, 0.0)), [False, False], id="as far as the first robot"),
+        pytest.param(((0.5, 0.0), (0.62, 0.0)), [False, True], id="farther, in the same direction"),
+        pytest.param(((0.5, 0.0), (0.62, 0.0), (0.62, 0.0)), [False, True, False], id="where the displaced one stood"),
+        pytest.param(((0.5, 0.0), (0.44, 0.0), (0.38, 0.0)), [False, False, True], id="less far from robot to robot"),
+    ],
+)
+def test_without_a_coordinator_a_way_shows_a_robot_that_stands_elsewhere(
+    ways: tuple[tuple[float, float], ...], displaced: list[bool]
+) -> None:
+    """Each robot inherits the ways of the one before, and its bearings are those of the first one."""
+    found, bearings = References(), (ReferenceBearing(0, 7, 0.0, 1),)
+    shown = []
+    for way in ways:
+        shown.append(found.take_way(3, way))
+        found = References(bearings, ((slot, *each) for slot, each in found.ways.items()))
+    assert shown == displaced
+    assert not found.take_way(4, (9.0, 9.0)), "nobody came from there before"

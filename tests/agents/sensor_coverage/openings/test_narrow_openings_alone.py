@@ -33,3 +33,15 @@ WITNESS = ("services.path=gradient", "time.duration_s=600.0")
 def test_robots_alone_pass_by_no_narrow_opening(seed: int, dies: bool, more: tuple[str, ...]) -> None:
     result = carry_out(seed, dies, more, UntilInSight())
     assert result.outcome != "completed" or result.metrics["reachable_coverage_fraction"] >= 0.98
+
+
+@pytest.mark.parametrize(
+    ("seed", "run_seed"),
+    [
+        pytest.param(736, 1, id="a door of 1.3 bodies: a standing robot touches one jamb, and a walking one the other"),
+        pytest.param(751, 2, id="a bend of 1.6 bodies, where a walking robot pushed the only one that saw it"),
+    ],
+)
+def test_robots_alone_pass_by_no_narrow_opening_with_noise_and_other_seeds_of_the_run(seed: int, run_seed: int) -> None:
+    result = carry_out(seed, False, (*ALONE, NOISE), UntilInSight(), run_seed)
+    assert result.outcome != "completed" or result.metrics["reachable_coverage_fraction"] >= 0.98
