@@ -44,9 +44,9 @@ OVERHANG: Final = math.sin(CONTACT_RAD)
 # A line of sight back to the start may leave the way on the side away from the wall by this part of a body's radius: a whole
 # radius, less the error of the place of a touched point.
 FREE: Final = 1.0 - OVERHANG
-# A line of sight from the start is free up to this part of a body's radius beside the way. The body sweeps a radius. A corner
-# in the rest hides less, 0.3 m away, than is left out beside both ends of what was followed (`frontier.strips.sight_ends`).
-SWEPT: Final = 1.5
+# A line of sight from the start counts as free up to this part of a body's radius beside the way. The body sweeps a radius.
+# With the rest the walls that a probe follows near a slot count, which are at most a diameter away.
+SWEPT: Final = 2.0
 
 
 class NearPoint(NamedTuple):
