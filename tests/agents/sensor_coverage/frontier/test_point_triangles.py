@@ -290,6 +290,18 @@ def test_a_slot_that_ties_an_end_does_not_rely_on_a_slot_that_looks_past_it(
     assert ((2, 4) in pairs_of(point, views, end, ties)) is counts
 
 
+@pytest.mark.parametrize(("wall_deg", "counts"), [(-2.0, False), (178.0, True)])
+def test_a_slot_that_looks_along_a_wall_looks_past_its_end_as_far_as_the_touched_point(
+    wall_deg: float, counts: bool
+) -> None:
+    """Slot 3 stands in a mouth, at which the wall ends along which slot 2 looks, as drawn building 769 showed."""
+    degrees = {2: {3: 94.2}, 3: {2: -85.6}}
+    views = {slot: {other: math.radians(each) for other, each in seen.items()} for slot, seen in degrees.items()}
+    point = WalkPoint({2: math.radians(88.1), 3: math.radians(82.1)}, (0.0,), ())
+    end = WalkPoint({2: math.radians(90.0), 3: math.radians(-69.5)}, (math.radians(wall_deg),), (3,))
+    assert ((3, 2) in pairs_of(point, views, end, (3,))) is counts
+
+
 def pairs_of(
     point: WalkPoint, views: Views, end: WalkPoint | None = None, ties: tuple[int, ...] = ()
 ) -> tuple[Pair, ...]:
