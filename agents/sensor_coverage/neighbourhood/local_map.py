@@ -64,7 +64,7 @@ class LocalMap(NeighbourTable):
         self._bodies = Obstructions()
         self.plan_count = 0
         self._makers = makers
-        self._references = References()
+        self.references = References()
         self._slots = Slots()
         self._planner = makers.planner(parameters, self._slots)
         self._plan_basis: object = None
@@ -73,26 +73,19 @@ class LocalMap(NeighbourTable):
     # --- memory of the slot -------------------------------------------------------------------------------------------
 
     def learn_references(self) -> None:
-        """Refine the reference directions to all slots whose robots see this robot too.
-
-        Where this robot stands elsewhere than the former one at its slot, what that one saw of walls closes nothing.
-        """
+        """Refine the reference directions to all slots whose robots see this robot too."""
         if self.heading is None or self.slot == NOWHERE:
             return
         for node, state in self.mutual().items():
             numbers = self.epoch, self.samples, state.epoch, state.samples
-            if self._references.is_new(node, numbers):
+            if self.references.is_new(node, numbers):
                 there, back = self.seen[node].bearing_rad + self.heading, self._back(node) or 0.0
                 distance_m = self.distances_m.get(state.slot, math.inf)
-                if self._references.take(node, state.slot, numbers, there, back, distance_m):
-                    self._forget_walls()
+                if self.references.take(node, state.slot, numbers, there, back, distance_m):
+                    self.forget_walls()
 
-    def note_way(self, slot: int, way: tuple[float, float]) -> None:
-        """Note the way (x, y) [m] from a slot to this one in the base's frame: it may show that this robot stands elsewhere."""
-        if self._references.take_way(slot, way):
-            self._forget_walls()
-
-    def _forget_walls(self) -> None:
+    def forget_walls(self) -> None:
+        """Forget what former robots at the slot saw of walls: this one stands elsewhere."""
         self.proof.inherit(())
         self._planner.walls.forget()
 
@@ -110,7 +103,7 @@ class LocalMap(NeighbourTable):
         log, me = self._planner.attempt_log, self.slot
         return SlotMemory(
             me,
-            self._references.memory(self.at),
+            self.references.memory(self.at),
             tuple(self._slots.walls.get(me, ())),
             tuple(log.closed),
             tuple(key for key, slot in log.failed if slot == me),
@@ -123,7 +116,7 @@ class LocalMap(NeighbourTable):
             tuple(self.distances_m.items()),
             tuple(self._planner.walls.probed.get(me, ())),
             self.proof.edges(),
-            tuple((slot, *way) for slot, way in self._references.ways.items()),
+            tuple((slot, *way) for slot, way in self.references.ways.items()),
         )
 
     def reopen(self) -> None:
@@ -143,11 +136,7 @@ class LocalMap(NeighbourTable):
     # --- robots that died or restarted --------------------------------------------------------------------------------
 
     def remove_dead(self, node: int) -> None:
-        """Forget a robot that is dead, and end the claims of its slot.
-
-        Without it the gaps around this slot have other directions, so attempts at gaps do not count any more. The
-        directions in which walls stopped drives remain.
-        """
+        """Forget a robot that is dead, the claims of its slot, and attempts at gaps: these have other directions without it."""
         slot = self.slot_of(node)
         if slot != NOWHERE and not self.states[node].moving and not self.path_vectors.is_claimed(slot):
             self._bodies.finished[node] = None
@@ -172,7 +161,7 @@ class LocalMap(NeighbourTable):
         """Occupy no slot, and delete all that is known of the present one."""
         self.slot = NOWHERE
         self.redundant = False
-        self._references = References()
+        self.references = References()
         self._slots = Slots()
         self._planner = self._makers.planner(self.parameters, self._slots)
         self._drop_plans()
@@ -198,7 +187,7 @@ class LocalMap(NeighbourTable):
         """Take over a slot with its memory."""
         self._take(memory.slot, memory.claims)
         me = self.slot
-        self._references = References(memory.references, memory.ways)
+        self.references = References(memory.references, memory.ways)
         self._slots.walls[me] = list(memory.walls)
         log = self._planner.attempt_log
         log.closed = dict.fromkeys(memory.closed)
@@ -250,7 +239,7 @@ class LocalMap(NeighbourTable):
         self.plan_count += 1
         me, planner, scan = self.slot, self._planner, self.scan()
         take_over(planner.attempt_log, me, mutual.values(), self.parameters.attempts_max)
-        for slot, (mean, _) in self._references.items():
+        for slot, (mean, _) in self.references.items():
             self._slots.remember(me, slot, cmath.phase(mean))
         follows, arcs = self.parameters.walls == "followed", list[Arc]()
         if follows:

@@ -289,7 +289,8 @@ class TokenPush(PushPart, LeadPush, WallPush):
         ahead = self._chain.ahead
         if self._start is not None and self._chain.origin != NOWHERE:
             x_m, y_m = (now - then for now, then in zip(self._situation.motion.position, self._start, strict=True))
-            self._map.note_way(self._chain.origin, turned_vector((x_m, y_m), self._heading))
+            if self._map.references.take_way(self._chain.origin, turned_vector((x_m, y_m), self._heading)):
+                self._map.forget_walls()
         if ahead is None:
             self.close(PushDone(self.id))
             return

@@ -145,10 +145,8 @@ def test_another_robot_at_a_slot_does_not_know_the_walls_close_to_it() -> None:
     assert slots.take_replaced() == ()
 
 
-@pytest.mark.parametrize(("wall_m", "least_deg"), [(0.08, 20.0), (0.15, 20.0), (0.3, 5.0)])
-def test_walls_that_another_robot_at_a_slot_knows_are_closed_wherever_it_stands(
-    wall_m: float, least_deg: float
-) -> None:
+@pytest.mark.parametrize("wall_m", [0.08, 0.15, 0.3])
+def test_walls_that_another_robot_at_a_slot_knows_are_closed_wherever_it_stands(wall_m: float) -> None:
     """The robot follows a wall in the south, and the one in the east behind a corner."""
     south, (east,) = -math.pi / 2.0, EAST
     points = [
@@ -159,21 +157,13 @@ def test_walls_that_another_robot_at_a_slot_knows_are_closed_wherever_it_stands(
     assert all(y > -wall_m + 0.6 * RADIUS_M for _, y in places), "no body is in the wall"
     closed = united_round(Arc(*each) for each in arcs_around_all(places, points, -1, RADIUS_M))
     here = united_round(Arc(*each) for each in walls_around(SLOT, points, -1, RADIUS_M).followed)
-    assert math.radians(least_deg) < sum(each.width_rad for each in closed) < sum(each.width_rad for each in here)
+    assert math.radians(20.0) < sum(each.width_rad for each in closed) < sum(each.width_rad for each in here)
     tight = [Arc(each.start_rad + TOLERANCE_RAD, each.width_rad - 2.0 * TOLERANCE_RAD) for each in closed]
     for number in range(60):
         x, y = 0.05 * math.cos(0.4 * number), 0.05 * math.sin(0.4 * number)
         if y > -wall_m + RADIUS_M:
             there = united_round(Arc(*each) for each in walls_around((x, y), points, -1, RADIUS_M).followed)
             assert all(contains(there, each) for each in tight if each.width_rad > 0.0), (x, y)
-
-
-def test_a_wall_that_a_corner_may_hide_from_the_slot_closes_nothing() -> None:
-    """The robot drives 0.36 m to a wall in the east, and follows it to the north. A corner may be north of its straight way."""
-    points = [NearPoint((0.36, 0.05 * each), EAST) for each in range(8)]
-    closed = united_round(Arc(*each) for each in walls_around(SLOT, points, -1, RADIUS_M).followed)
-    assert contains(closed, Arc(0.0, math.radians(10.0)))
-    assert not any((math.radians(25.0) - each.start_rad) % math.tau < each.width_rad for each in closed)
 
 
 def test_a_triangle_across_one_of_robots_closes_nothing() -> None:

@@ -44,9 +44,6 @@ OVERHANG: Final = math.sin(CONTACT_RAD)
 # A line of sight back to the start may leave the way on the side away from the wall by this part of a body's radius: a whole
 # radius, less the error of the place of a touched point.
 FREE: Final = 1.0 - OVERHANG
-# A line of sight from the start counts as free up to this part of a body's radius beside the way. The body sweeps a radius.
-# With the rest the walls that a probe follows near a slot count, which are at most a diameter away.
-SWEPT: Final = 2.0
 
 
 class NearPoint(NamedTuple):
@@ -165,21 +162,19 @@ def _followed(
     start: Vector, points: Sequence[NearPoint], stretches: Iterable[_Stretch], hand: int, radius_m: float
 ) -> Iterator[tuple[float, float]]:
     """Yield the arcs (start, width) [rad] around a start in which walls were followed; see `walls_around`."""
-    way = [each.at for each in points]
-    swept = [is_swept(start, way[: number + 1], radius_m) for number in range(len(way))]
     for number, each in enumerate(points):
         limit_rad = WEDGE_RAD if _turns_back(start, points, number) else CORNER_RAD
-        for a, b in combinations(each.walls, 2) if swept[number] else ():
+        for a, b in combinations(each.walls, 2):
             if angle_between(a, b) < limit_rad:
                 yield _between(start, *(touched_point(each.at, wall, radius_m) for wall in (a, b)))
-    for number, (before, point) in enumerate(pairwise(points), 1):
-        for a, b in _same_walls(before, point) if swept[number] else ():
+    for before, point in pairwise(points):
+        for a, b in _same_walls(before, point):
             yield _between(start, touched_point(before.at, a, radius_m), touched_point(point.at, b, radius_m))
+    way = [each.at for each in points]
     in_sight = [start_in_sight(start, way[: number + 1], hand, radius_m) is not None for number in range(len(way))]
     for stretch in stretches:
         part = slice(stretch.first, stretch.last + 1)
-        seen = list(zip(points[part], in_sight[part], swept[part], strict=True))
-        yield from _arcs_of_stretch(start, seen, stretch.ends, hand)
+        yield from _arcs_of_stretch(start, list(zip(points[part], in_sight[part], strict=True)), stretch.ends, hand)
         if stretch.is_clear[0] and _begins_way(stretch, 0):
             yield _arc_past(start, stretch.ends[0], hand, radius_m)
 
@@ -217,21 +212,18 @@ def _turns_back(start: Vector, points: Sequence[NearPoint], number: int) -> bool
 
 
 def _arcs_of_stretch(
-    start: Vector, points: Sequence[tuple[NearPoint, bool, bool]], ends: Iterable[StretchEnd], hand: int
+    start: Vector, points: Sequence[tuple[NearPoint, bool]], ends: Iterable[StretchEnd], hand: int
 ) -> Iterator[tuple[float, float]]:
     """Yield the arcs (start, width) [rad] around a start that the steps along one stretch of wall close.
 
-    Each point states whether it is in sight of the start, as far as the wall at the hand is concerned, and whether the line
-    of sight was swept.
+    Each point states whether it is in sight of the start.
     """
     crossings = list[Crossing]()
-    for (before, was_in_sight, _), (point, is_in_sight, swept) in pairwise(points):
+    for (before, was_in_sight), (point, is_in_sight) in pairwise(points):
         first, width = _between(start, before.at, point.at)
         if min(math.dist(start, each.at) for each in (before, point)) <= NEAR_M_MIN:
             continue
         if width * hand < 0.0:  # the start and the wall are on different sides of the step
-            if not swept:
-                continue
             low, high = kept_part(before.at, point.at, first, width, ends)
             if low < high:
                 crossings.append(Crossing(arc_between(first + low * width, first + high * width), 1))
@@ -267,17 +259,6 @@ def start_in_sight(start: Vector, way: Sequence[Vector], hand: int, radius_m: fl
         if 0.0 < ux * dx + uy * dy < length_m and hand * (ux * dy - uy * dx) < -FREE * radius_m:
             return None
     return math.atan2(-uy, -ux)
-
-
-def is_swept(start: Vector, way: Sequence[Vector], radius_m: float) -> bool:
-    """Return whether the line from a start to the end of a way is close to the way: no corner hides the end from there.
-
-    The robot drove straight from the start to the first point.
-    """
-    x_m, y_m = way[-1][0] - start[0], way[-1][1] - start[1]
-    length_m = math.hypot(x_m, y_m)
-    aside_m = SWEPT * radius_m * length_m
-    return all(abs(x_m * (y - start[1]) - y_m * (x - start[0])) <= aside_m for x, y in way)
 
 
 def _between(start: Vector, a: Vector, b: Vector) -> tuple[float, float]:
