@@ -17,7 +17,6 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import WalkPoint, arc_betw
 
 # A point of a walk lies within a triangle's angle only if it is this far from its sides: bearings have noise.
 HIDDEN_MIN_RAD: Final = math.radians(2.0)
-
 # The point of a wall that a walking robot touches is seen this far [rad] beside the robot, at a distance of 0.5 m.
 TOUCHED_RAD: Final = math.radians(8.0)
 # Directions of an arc are tested this far [rad] apart.
