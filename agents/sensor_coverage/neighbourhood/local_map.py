@@ -21,7 +21,7 @@ from zwerm.agents.sensor_coverage.messages.pushes import SlotMemory
 from zwerm.agents.sensor_coverage.neighbourhood.attempt_exchange import attempts_at, other_end, take_over
 from zwerm.agents.sensor_coverage.neighbourhood.neighbour_table import NeighbourTable
 from zwerm.agents.sensor_coverage.neighbourhood.obstructions import Obstructions
-from zwerm.agents.sensor_coverage.neighbourhood.references import References
+from zwerm.agents.sensor_coverage.neighbourhood.references import Displaced, References
 from zwerm.agents.sensor_coverage.protocols.path_vector import PathVectorProtocol
 from zwerm.maths.simplicial import Edge, FlagComplex, edge
 
@@ -77,12 +77,14 @@ class LocalMap(NeighbourTable):
         if self.heading is None or self.slot == NOWHERE:
             return
         for node, state in self.mutual().items():
-            numbers = self.epoch, self.samples, state.epoch, state.samples
-            if self.references.is_new(node, numbers):
+            if self.references.is_new(node, numbers := (self.epoch, self.samples, state.epoch, state.samples)):
                 there, back = self.seen[node].bearing_rad + self.heading, self._back(node) or 0.0
-                distance_m = self.distances_m.get(state.slot, math.inf)
-                if self.references.take(node, state.slot, numbers, there, back, distance_m):
-                    self.forget_walls()
+                known_m = self.distances_m.get(state.slot, math.inf)
+                match self.references.take(node, state.slot, numbers, there, back, known_m):
+                    case Displaced.SELF:
+                        self.forget_walls()
+                    case Displaced.OTHER:
+                        self.proof.lose(state.slot)
 
     def forget_walls(self) -> None:
         """Forget what former robots at the slot saw of walls: this one stands elsewhere."""

@@ -3,6 +3,7 @@
 import cmath
 import math
 from collections.abc import Callable, Iterable
+from enum import Enum, auto
 
 from zwerm.agents.sensor_coverage.frontier.directions import (
     DISPLACED_M_MIN,
@@ -11,6 +12,14 @@ from zwerm.agents.sensor_coverage.frontier.directions import (
     refined_reference,
 )
 from zwerm.agents.sensor_coverage.messages.pushes import ReferenceBearing
+
+
+class Displaced(Enum):
+    """Which of two robots that see each other stands elsewhere than the former one at its slot."""
+
+    NONE = auto()
+    SELF = auto()
+    OTHER = auto()
 
 
 class References:
@@ -36,17 +45,19 @@ class References:
 
     def take(
         self, node: int, slot: int, numbers: tuple[int, ...], there_rad: float, back_rad: float, distance_m: float
-    ) -> bool:
-        """Take a reading from both ends; return whether it shows that this robot stands elsewhere than the former one here.
+    ) -> Displaced:
+        """Take a reading from both ends; return which robot stands elsewhere than the former one at its slot.
 
-        It does if the direction is off, unless another robot stands at the other slot than before. `distance_m` is the distance
-        of that slot [m], infinite if it is not known.
+        One does if the direction is off: the other one if it is not the robot of the latest reading. `distance_m` is the
+        distance of that slot [m], infinite if it is not known.
         """
-        known = self._known.get(slot)
-        displaced = is_displaced(known, there_rad, back_rad, distance_m) and self._readers.get(slot, node) == node
+        known, is_new = self._known.get(slot), self._readers.get(slot, node) != node
+        displaced = is_displaced(known, there_rad, back_rad, distance_m)
         self._learned[node], self._readers[slot] = numbers, node
         self._known[slot] = refined_reference(known, there_rad, back_rad)
-        return displaced
+        if not displaced:
+            return Displaced.NONE
+        return Displaced.OTHER if is_new else Displaced.SELF
 
     def take_way(self, slot: int, way: tuple[float, float]) -> bool:
         """Take the way from a slot; return whether it shows that this robot stands elsewhere than a former one.

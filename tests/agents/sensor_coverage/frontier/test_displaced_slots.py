@@ -8,7 +8,7 @@ import pytest
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, Walk, WalkPoint
 from zwerm.agents.sensor_coverage.messages.pushes import ReferenceBearing
-from zwerm.agents.sensor_coverage.neighbourhood.references import References
+from zwerm.agents.sensor_coverage.neighbourhood.references import Displaced, References
 
 EAST = math.radians(10.0)
 FAR_OFF, CLOSE = math.radians(25.0), math.radians(15.0)
@@ -140,3 +140,21 @@ def test_without_a_coordinator_a_way_shows_a_robot_that_stands_elsewhere(
         found = References(bearings, ((slot, *each) for slot, each in found.ways.items()))
     assert shown == displaced
     assert not found.take_way(4, (9.0, 9.0)), "nobody came from there before"
+
+
+@pytest.mark.parametrize(
+    ("readers", "displaced"),
+    [
+        pytest.param((7, 7), Displaced.SELF, id="one robot, read twice"),
+        pytest.param((7, 8), Displaced.OTHER, id="another robot at the other slot"),
+    ],
+)
+def test_without_a_coordinator_a_bearing_shows_which_robot_stands_elsewhere(
+    readers: tuple[int, int], displaced: Displaced
+) -> None:
+    found, there_rad = References(), (0.0, math.radians(60.0))
+    shown = [
+        found.take(node, 3, (1, number, 1, number), there, there + math.pi, 0.5)
+        for number, (node, there) in enumerate(zip(readers, there_rad, strict=True))
+    ]
+    assert shown == [Displaced.NONE, displaced]
