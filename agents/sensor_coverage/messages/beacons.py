@@ -77,7 +77,7 @@ class StateBeacon(_BeaconMessage, frozen=True, tag="state"):
     `number` counts the sender's states, `epoch` its drives, and `samples` its averages of bearings. `expandable` has the
     sides, as (other slot, sign), that it could expand. `waiting`: it stands at the base, ready to go. `redundant`: it
     has left the complex, and its body still stands at its slot. `guests` are the robots that stand at the base's own
-    point; only a base station names them.
+    point; only a base station names them. `displaced`: it was pushed away from its slot, and sees other walls than from there.
     """
 
     number: int
@@ -92,6 +92,12 @@ class StateBeacon(_BeaconMessage, frozen=True, tag="state"):
     path_vector: PathVector
     redundant: bool = False
     guests: tuple[int, ...] = ()
+    displaced: bool = False
+
+    @property
+    def is_at_slot(self) -> bool:
+        """True if the robot stands at a slot of the complex, and sees of walls what is seen from there."""
+        return self.slot != NOWHERE and not (self.moving or self.redundant or self.displaced)
 
 
 class StateRequest(_BeaconMessage, frozen=True, tag="state-request"):

@@ -161,18 +161,15 @@ class LocalMap(NeighbourTable):
 
     def vacate(self) -> None:
         """Occupy no slot, and delete all that is known of the present one."""
-        self.slot = NOWHERE
-        self.redundant = False
+        self.slot, self.redundant = NOWHERE, False
         self.references = References()
         self._slots = Slots()
         self._planner = self._makers.planner(self.parameters, self._slots)
         self._drop_plans()
         self.proof, self.distances_m = self._makers.proof(), {}
         self.reach.leave()
-        self._bodies.stopped = {}
-        self._plan_basis = None
-        self._led = None
-        self._handovers = {}
+        self._bodies.stopped, self._handovers = {}, {}
+        self._plan_basis = self._led = None
         self.change()
 
     def occupy(self, slot: int) -> None:
@@ -377,13 +374,14 @@ class LocalMap(NeighbourTable):
 
     def state(self, waiting: bool) -> StateBeacon:
         """Return this robot's state without its number and path vector."""
-        heading = self.heading
-        seen: tuple[SeenRobot, ...] = ()
-        if heading is not None:
-            seen = tuple(
-                SeenRobot(node, epoch, slot, wrapped(bearing + heading))
-                for node, (epoch, slot, bearing) in sorted(self.seen.items())
+        heading, sightings = self.heading, sorted(self.seen.items())
+        seen = (
+            ()
+            if heading is None
+            else tuple(
+                SeenRobot(node, epoch, slot, wrapped(bearing + heading)) for node, (epoch, slot, bearing) in sightings
             )
+        )
         return StateBeacon(
             0,
             self.slot,
@@ -397,4 +395,5 @@ class LocalMap(NeighbourTable):
             NO_PATH_VECTOR,
             self.redundant,
             self.guests,
+            self.displaced,
         )

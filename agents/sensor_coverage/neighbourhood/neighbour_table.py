@@ -48,6 +48,7 @@ class NeighbourTable:
         self.reach = BaseReach(FAR)
         self.epoch = first_count(incarnation)
         self.moving = False
+        self.displaced = False
         self.heading: float | None = None
         self.samples = 0
         self.distances_m: dict[int, float] = {}
@@ -149,7 +150,7 @@ class NeighbourTable:
     def begin_drive(self) -> None:
         """Begin a drive: earlier bearings no longer hold."""
         self.epoch += 1
-        self.moving = True
+        self.moving, self.displaced = True, False
         self.samples = 0
         self.seen = {}
         self.change()
@@ -158,6 +159,12 @@ class NeighbourTable:
         """End a drive: the robot stands still."""
         self.moving = False
         self.change()
+
+    def set_displaced(self, displaced: bool) -> None:
+        """Set whether this robot was pushed so far away from its slot that it sees other walls than from there."""
+        if displaced != self.displaced:
+            self.displaced = displaced
+            self.change()
 
     def update_bearings(self, bearings: Mapping[int, float]) -> None:
         """Take in averaged bearings [rad] of visible robots."""

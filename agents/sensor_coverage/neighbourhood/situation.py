@@ -386,10 +386,9 @@ class Situation:
         self.local_map.update_walls(frame.touched, frame.touched_robots)
 
     def _recover(self, rest: Vector) -> Drive:
-        self.motion.rest = yield from self.motion.return_to_rest(rest, self.local_map.begin_drive)
+        self.motion.rest = yield from self.motion.return_to_rest(rest, lambda: self.local_map.set_displaced(True))
+        self.local_map.set_displaced(False)
         self.check_at_base(BESIDE_BASE_M)
-        if self.local_map.moving:  # it was so far away that what it saw counts for no slot
-            self.stand()
 
     def check_at_base(self, within_m: float = AT_BASE_M) -> None:
         """Find out whether the robot is off the base's point. Then it sees other robots than the base, and takes a slot."""

@@ -17,7 +17,7 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import WalkPoint, arc_betw
 
 # A point of a walk lies within a triangle's angle only if it is this far from its sides: bearings have noise.
 HIDDEN_MIN_RAD: Final = math.radians(2.0)
-# The point of a wall that a walking robot touches is seen this far [rad] beside the robot, at a distance of 0.5 m.
+# A point of a wall that a walking robot touches is seen this far [rad] beside the robot at most, at a distance of 0.5 m.
 TOUCHED_RAD: Final = math.radians(8.0)
 # Directions of an arc are tested this far [rad] apart.
 CLOSED_STEP_RAD: Final = math.radians(3.0)
@@ -72,7 +72,7 @@ class PointTriangles:
         """Add an end of a stretch at a point that a slot saw, and the slots that tie it."""
         there = point.seen[slot]
         for wall in point.walls:  # the slot looks past the end as far as the touched point
-            past = there + math.copysign(TOUCHED_RAD, math.remainder(wall - there, math.tau))
+            past = there + TOUCHED_RAD * math.sin(wall - there)
             for each in ties:
                 if each != slot and each in point.seen:
                     self._tied.setdefault((each, slot), []).append((point.seen[each], past, ties))

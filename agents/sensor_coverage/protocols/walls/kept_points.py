@@ -58,7 +58,7 @@ class KeptPoints:
         places = {
             node: Place(state.slot, state.epoch)
             for node in named
-            if (state := here.states.get(node)) is not None and not state.moving
+            if (state := here.states.get(node)) is not None and not (state.moving or state.displaced)
         }
         self._points.append(_Kept(sender, passed, places | {here.node: Place(here.slot, here.epoch)}))
 

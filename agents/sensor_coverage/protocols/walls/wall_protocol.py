@@ -47,6 +47,7 @@ class ProvedSlot(Neighbourhood, Protocol):
 
     moving: bool
     redundant: bool
+    displaced: bool
     heading: float | None
     proof: SlotCoverageProof
 
@@ -212,7 +213,7 @@ class WallProtocol(Component):
     @property
     def _proves(self) -> bool:
         local_map = self._situation.local_map
-        placed = local_map.slot != NOWHERE and not (local_map.moving or local_map.redundant)
+        placed = local_map.slot != NOWHERE and not (local_map.moving or local_map.redundant or local_map.displaced)
         return placed and local_map.heading is not None
 
     def _hear(self, sender: int, passed: PassedPoint, tick: int) -> None:
@@ -229,7 +230,8 @@ class WallProtocol(Component):
     def _slots(self) -> dict[int, int]:
         """Return the slots of this robot and of the robots that it sees and that see it."""
         local_map = self._situation.local_map
-        return {node: state.slot for node, state in local_map.mutual().items()} | {local_map.node: local_map.slot}
+        standing = {node: state.slot for node, state in local_map.mutual().items() if not state.displaced}
+        return standing | {local_map.node: local_map.slot}
 
     def _warn(self, sender: int, passed: PassedPoint) -> None:
         """Tell the walking robot once which robots that it sees or touches are dead: it may not have asked them."""
@@ -309,7 +311,7 @@ class WallProtocol(Component):
         """Return the slots of robots that stand, as far as this robot knows. A dead robot may be in sight that nobody knows."""
         known = self._situation.local_map.states
         states = [known[node] for node in nodes if node in known]
-        return tuple(each.slot for each in states if not (each.moving or each.redundant or each.slot == NOWHERE))
+        return tuple(each.slot for each in states if each.is_at_slot)
 
     def _end_walks(self, tick: int) -> None:
         """Take into the proof how far walls were followed by walks that have ended."""

@@ -219,9 +219,18 @@ def test_a_walking_robot_is_told_once_which_robots_in_sight_are_dead() -> None:
     assert not here.said_dead, "another walk"
 
 
-@pytest.mark.parametrize(("node", "kept_deg"), [(NEIGHBOUR, 0.0), (HEIR, STEPS_DEG + TRIANGLE_DEG)])
-def test_what_a_former_robot_saw_of_walls_falls_where_this_one_stands_elsewhere(node: int, kept_deg: float) -> None:
-    """If another robot is at the neighbour's slot, that one stands elsewhere."""
+@pytest.mark.parametrize(
+    ("node", "off_rad", "kept_deg"),
+    [
+        pytest.param(NEIGHBOUR, OFF_RAD, 0.0, id="this robot stands elsewhere"),
+        pytest.param(HEIR, OFF_RAD, 0.0, id="another robot at the neighbour's slot stands elsewhere"),
+        pytest.param(HEIR, 0.1, STEPS_DEG + TRIANGLE_DEG, id="another robot at the neighbour's slot"),
+    ],
+)
+def test_what_a_former_robot_saw_of_walls_falls_where_one_stands_elsewhere(
+    node: int, off_rad: float, kept_deg: float
+) -> None:
+    """The neighbour's slot saw the walk, too."""
     here = Here()
     here.look()
     here.walls.poll(0)
@@ -229,8 +238,19 @@ def test_what_a_former_robot_saw_of_walls_falls_where_this_one_stands_elsewhere(
     here.local_map.learn_references()
     assert here.closed_deg == pytest.approx(STEPS_DEG + TRIANGLE_DEG)
     here.local_map.forget(NEIGHBOUR)
-    seen = SeenRobot(ME, here.local_map.epoch, SLOTS[ME], math.pi + OFF_RAD)
+    seen = SeenRobot(ME, here.local_map.epoch, SLOTS[ME], math.pi + off_rad)
     here.local_map.receive(node, state(node, 3, 5, False, seen), 0)
-    here.local_map.update_bearings({node: OFF_RAD})
+    here.local_map.update_bearings({node: off_rad})
     here.local_map.learn_references()
     assert here.closed_deg == pytest.approx(kept_deg)
+
+
+@pytest.mark.parametrize(("displaced", "closed_deg"), [(False, STEPS_DEG + TRIANGLE_DEG), (True, 0.0)])
+def test_a_robot_that_was_pushed_away_takes_no_point_for_its_slot(displaced: bool, closed_deg: float) -> None:
+    here = Here()
+    here.look()
+    here.walls.poll(0)
+    here.local_map.set_displaced(displaced)
+    assert here.local_map.state(False).displaced is displaced
+    here.watch_walk()
+    assert here.closed_deg == pytest.approx(closed_deg)
