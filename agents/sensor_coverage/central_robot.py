@@ -65,7 +65,7 @@ class CentralRobot(Controller):
         self._trail = Trail()
         self._left = self.motion.position  # where it stood before it was deployed or moved to another slot
         self._dead: dict[int, None] = {}  # as far as the coordinator has said
-        self.wall_walk = WallWalk(self.motion, self._dead)
+        self.wall_walk = WallWalk(self.motion, self._dead, swept_only=True)
         self.commands = RequestDeduplicator(int(self.random.integers(1, INCARNATIONS)), self._on_command)
         self.components = ComponentLoop(self._make_components(), self._make_codecs(), setup.incarnation)
         self._activity: Drive | None = self._emerge()

@@ -4,6 +4,7 @@ The wall is a block whose south face is at y = 0.08 m and whose west face is at 
 """
 
 import math
+from collections.abc import Iterable
 
 import pytest
 
@@ -164,6 +165,49 @@ def test_walls_that_another_robot_at_a_slot_knows_are_closed_wherever_it_stands(
         if y > -wall_m + RADIUS_M:
             there = united_round(Arc(*each) for each in walls_around((x, y), points, -1, RADIUS_M).followed)
             assert all(contains(there, each) for each in tight if each.width_rad > 0.0), (x, y)
+
+
+def closed_by(way: NearWay) -> list[Arc]:
+    """Return the arcs that a way closes around the slot."""
+    return united_round(Arc(*each) for each in way.walls().followed)
+
+
+def is_open_at(closed: Iterable[Arc], degrees: float) -> bool:
+    """Return whether arcs leave a direction open."""
+    return not any((math.radians(degrees) - each.start_rad) % math.tau < each.width_rad for each in closed)
+
+
+@pytest.mark.parametrize(
+    ("swept_only", "way_back", "is_open"),
+    [
+        pytest.param(False, [], False, id="a robot without a coordinator"),
+        pytest.param(True, [], True, id="it goes on"),
+        pytest.param(True, [(0.24, 0.23), (0.12, 0.12), (0.01, 0.0)], False, id="it drives straight back"),
+        pytest.param(True, [(0.3, 0.2), (0.27, 0.07), (0.01, 0.0)], True, id="it is led round a corner"),
+        pytest.param(True, [(0.24, 0.23)], True, id="it is stopped on its way back"),
+    ],
+)
+def test_a_wall_counts_only_where_no_corner_may_hide_it(
+    swept_only: bool, way_back: list[tuple[float, float]], is_open: bool
+) -> None:
+    """The robot drives 0.36 m to a wall in the east, and follows it to the north. A corner may be north of its straight way."""
+    way = NearWay(SLOT, -1, RADIUS_M, swept_only)
+    for number in range(8):
+        way.take(NearPoint((0.36, 0.05 * number), EAST))
+    if way_back:
+        way.close(way_back)
+    assert not is_open_at(closed_by(way), 10.0)
+    assert is_open_at(closed_by(way), 35.0) is is_open
+
+
+def test_a_way_that_begins_at_a_jamb_closes_little_beside_it() -> None:
+    """The robot touches the jamb of a mouth in the south, 0.09 m away, and follows the wall to the north."""
+    way = NearWay(SLOT, -1, RADIUS_M)
+    for number in range(4):
+        way.take(NearPoint((0.02, 0.05 * number), EAST))
+    assert not is_open_at(closed_by(way), 10.0)
+    assert not is_open_at(closed_by(way), -2.0)
+    assert is_open_at(closed_by(way), -6.0)
 
 
 def test_a_triangle_across_one_of_robots_closes_nothing() -> None:

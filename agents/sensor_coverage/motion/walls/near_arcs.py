@@ -41,9 +41,15 @@ WEDGED_M: Final = 0.005
 # The place of a touched point is known within this part of a body's radius, by the width of a switch. So far a wall goes on
 # beyond it: two walks from the same slot that begin at the same point leave no gap.
 OVERHANG: Final = math.sin(CONTACT_RAD)
+# Two walks from a slot that begin at the same touched point leave no gap of more than twice this [rad]. More of the wall's end
+# may be an opening, of which a robot close to it touches a jamb.
+BEGIN_RAD: Final = math.radians(3.0)
 # A line of sight back to the start may leave the way on the side away from the wall by this part of a body's radius: a whole
 # radius, less the error of the place of a touched point.
 FREE: Final = 1.0 - OVERHANG
+# A line of sight from the start counts as free up to this part of a body's radius beside the way. The body sweeps a radius.
+# With the rest the walls that a probe follows near a slot count, which are at most a diameter away.
+SWEPT: Final = 2.0
 
 
 class NearPoint(NamedTuple):
@@ -61,14 +67,23 @@ class NearPoint(NamedTuple):
 class NearWay:
     """The way of a robot along a wall from a `start` [m], with the wall at its hand: what it touched, and what it saw there.
 
-    `waypoints` are its points.
+    `waypoints` are its points. With `swept_only` a wall counts only where no corner may hide it from the start: where the way
+    there led close to the line of sight, or the robot drove straight back in the end (`close`).
     """
 
-    def __init__(self, start: Vector, hand: int, radius_m: float) -> None:
+    def __init__(self, start: Vector, hand: int, radius_m: float, swept_only: bool = False) -> None:
         self.hand = hand
         self.waypoints: list[Waypoint] = []
         self._start, self._radius_m = start, radius_m
         self._points: list[NearPoint] = []
+        self._swept_only = swept_only
+
+    def close(self, way_back: Iterable[Vector]) -> None:
+        """Note how the robot drove back to the start. If it did so straight, no corner is between that and the way out."""
+        *_, end = driven = [self._points[-1].at, *way_back]
+        arrived = math.dist(end, self._start) < self._radius_m
+        if arrived and is_swept(self._start, driven[::-1], FREE * self._radius_m):
+            self._swept_only = False
 
     def take(self, point: NearPoint) -> None:
         """Take in the next point."""
@@ -76,12 +91,12 @@ class NearWay:
 
     def walls(self) -> NearWalls:
         """Return the arcs (start, width) [rad] around the start that the way closes."""
-        return walls_around(self._start, self._points, self.hand, self._radius_m)
+        return walls_around(self._start, self._points, self.hand, self._radius_m, self._swept_only)
 
     def arcs_beside(self) -> NearArcs:
         """Return the arcs (start, width) [rad] that the way closes around each place where another robot may stand."""
         places = places_beside(self._start, self._points, self._radius_m)
-        return arcs_around_all(places, self._points, self.hand, self._radius_m)
+        return arcs_around_all(places, self._points, self.hand, self._radius_m, self._swept_only)
 
     def seen_from_start(self) -> list[Waypoint]:
         """Return the waypoints from the first one that has a direction from the start."""
@@ -102,7 +117,9 @@ class _Stretch(NamedTuple):
     is_clear: tuple[bool, bool]
 
 
-def walls_around(start: Vector, points: Sequence[NearPoint], hand: int, radius_m: float) -> NearWalls:
+def walls_around(
+    start: Vector, points: Sequence[NearPoint], hand: int, radius_m: float, swept_only: bool = False
+) -> NearWalls:
     """Return the walls around a start that were followed in touch, by odometry.
 
     Two successive points close the arc between them, if the wall is beyond, up to the touched points at the ends of a stretch
@@ -111,7 +128,8 @@ def walls_around(start: Vector, points: Sequence[NearPoint], hand: int, radius_m
     same wall there with its other hand. Two successive contacts with the same wall close the arc
     between the touched points of the wall. So do two contacts at the same point, because a body does not pass between them:
     those of a corner, or of a wedge from which the robot turned back. A dead robot may fill an opening: from there on only
-    the same wall closes an arc, up to the next wall. A step from one wall to the opposite one closes nothing.
+    the same wall closes an arc, up to the next wall. A step from one wall to the opposite one closes nothing. With `swept_only`
+    nor does a wall that a corner on the other side of the way may hide from the start.
     """
     stretches = list(_stretches(points, hand, radius_m))
     past_ends = (
@@ -120,7 +138,7 @@ def walls_around(start: Vector, points: Sequence[NearPoint], hand: int, radius_m
         for number, is_clear in enumerate(stretch.is_clear)
         if is_clear and not _begins_way(stretch, number)
     )
-    return NearWalls(_positive(_followed(start, points, stretches, hand, radius_m)), _positive(past_ends))
+    return NearWalls(_positive(_followed(start, points, stretches, hand, radius_m, swept_only)), _positive(past_ends))
 
 
 def _stretches(points: Sequence[NearPoint], hand: int, radius_m: float) -> Iterator[_Stretch]:
@@ -159,24 +177,32 @@ def _same_walls(before: NearPoint, point: NearPoint) -> Iterator[tuple[float, fl
 
 
 def _followed(
-    start: Vector, points: Sequence[NearPoint], stretches: Iterable[_Stretch], hand: int, radius_m: float
+    start: Vector,
+    points: Sequence[NearPoint],
+    stretches: Iterable[_Stretch],
+    hand: int,
+    radius_m: float,
+    swept_only: bool = False,
 ) -> Iterator[tuple[float, float]]:
     """Yield the arcs (start, width) [rad] around a start in which walls were followed; see `walls_around`."""
+    way = [each.at for each in points]
+    swept = [not swept_only or is_swept(start, way[: number + 1], SWEPT * radius_m) for number in range(len(way))]
     for number, each in enumerate(points):
         limit_rad = WEDGE_RAD if _turns_back(start, points, number) else CORNER_RAD
-        for a, b in combinations(each.walls, 2):
+        for a, b in combinations(each.walls, 2) if swept[number] else ():
             if angle_between(a, b) < limit_rad:
                 yield _between(start, *(touched_point(each.at, wall, radius_m) for wall in (a, b)))
-    for before, point in pairwise(points):
-        for a, b in _same_walls(before, point):
+    for number, (before, point) in enumerate(pairwise(points), 1):
+        for a, b in _same_walls(before, point) if swept[number] else ():
             yield _between(start, touched_point(before.at, a, radius_m), touched_point(point.at, b, radius_m))
-    way = [each.at for each in points]
     in_sight = [start_in_sight(start, way[: number + 1], hand, radius_m) is not None for number in range(len(way))]
     for stretch in stretches:
         part = slice(stretch.first, stretch.last + 1)
-        yield from _arcs_of_stretch(start, list(zip(points[part], in_sight[part], strict=True)), stretch.ends, hand)
+        seen = list(zip(points[part], in_sight[part], swept[part], strict=True))
+        yield from _arcs_of_stretch(start, seen, stretch.ends, hand)
         if stretch.is_clear[0] and _begins_way(stretch, 0):
-            yield _arc_past(start, stretch.ends[0], hand, radius_m)
+            first, width = _arc_past(start, stretch.ends[0], hand, radius_m)
+            yield first, math.copysign(min(abs(width), BEGIN_RAD), width)
 
 
 def _positive(arcs: Iterable[tuple[float, float]]) -> NearArcs:
@@ -192,12 +218,16 @@ def places_beside(start: Vector, points: Iterable[NearPoint], radius_m: float) -
     return [start, *(place for place in places if all(math.dist(place, each) > FREE * radius_m for each in touched))]
 
 
-def arcs_around_all(places: Iterable[Vector], points: Sequence[NearPoint], hand: int, radius_m: float) -> NearArcs:
+def arcs_around_all(
+    places: Iterable[Vector], points: Sequence[NearPoint], hand: int, radius_m: float, swept_only: bool = False
+) -> NearArcs:
     """Return the arcs (start, width) [rad] in which a wall was followed around each of some places; see `walls_around`."""
     stretches = list(_stretches(points, hand, radius_m))
     shared = [Arc(0.0, math.tau)]
     for place in places:
-        closed = united(Arc(*each) for each in _positive(_followed(place, points, stretches, hand, radius_m)))
+        closed = united(
+            Arc(*each) for each in _positive(_followed(place, points, stretches, hand, radius_m, swept_only))
+        )
         shared = [part for each in shared for other in closed for part in shared_arcs(each, other)]
     return tuple(shared)
 
@@ -212,18 +242,21 @@ def _turns_back(start: Vector, points: Sequence[NearPoint], number: int) -> bool
 
 
 def _arcs_of_stretch(
-    start: Vector, points: Sequence[tuple[NearPoint, bool]], ends: Iterable[StretchEnd], hand: int
+    start: Vector, points: Sequence[tuple[NearPoint, bool, bool]], ends: Iterable[StretchEnd], hand: int
 ) -> Iterator[tuple[float, float]]:
     """Yield the arcs (start, width) [rad] around a start that the steps along one stretch of wall close.
 
-    Each point states whether it is in sight of the start.
+    Each point states whether it is in sight of the start, as far as the wall at the hand is concerned, and whether the line
+    of sight was swept.
     """
     crossings = list[Crossing]()
-    for (before, was_in_sight), (point, is_in_sight) in pairwise(points):
+    for (before, was_in_sight, _), (point, is_in_sight, swept) in pairwise(points):
         first, width = _between(start, before.at, point.at)
         if min(math.dist(start, each.at) for each in (before, point)) <= NEAR_M_MIN:
             continue
         if width * hand < 0.0:  # the start and the wall are on different sides of the step
+            if not swept:
+                continue
             low, high = kept_part(before.at, point.at, first, width, ends)
             if low < high:
                 crossings.append(Crossing(arc_between(first + low * width, first + high * width), 1))
@@ -259,6 +292,16 @@ def start_in_sight(start: Vector, way: Sequence[Vector], hand: int, radius_m: fl
         if 0.0 < ux * dx + uy * dy < length_m and hand * (ux * dy - uy * dx) < -FREE * radius_m:
             return None
     return math.atan2(-uy, -ux)
+
+
+def is_swept(start: Vector, way: Sequence[Vector], aside_m: float) -> bool:
+    """Return whether the line from a start to the end of a way is close to the way: no corner hides the end from there.
+
+    The robot drove straight from the start to the first point.
+    """
+    x_m, y_m = way[-1][0] - start[0], way[-1][1] - start[1]
+    limit = aside_m * math.hypot(x_m, y_m)
+    return all(abs(x_m * (y - start[1]) - y_m * (x - start[0])) <= limit for x, y in way)
 
 
 def _between(start: Vector, a: Vector, b: Vector) -> tuple[float, float]:

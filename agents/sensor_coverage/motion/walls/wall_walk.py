@@ -63,12 +63,13 @@ class WallWalk:
     """The walk of one robot along walls, over several commands: its trail, and the direction of the wall it has in touch.
 
     `on_step` is called with each point of a walk along a wall, one a tick; points at bodies of dead robots are held back.
-    `dead` are the robots that are known to be dead, which may change.
+    `dead` are the robots that are known to be dead, which may change. `swept_only` is that of `NearWay`.
     """
 
-    def __init__(self, motion: Locomotion, dead: Collection[int] = ()) -> None:
+    def __init__(self, motion: Locomotion, dead: Collection[int] = (), swept_only: bool = False) -> None:
         self.on_step: Callable[[Waypoint], None] = lambda _: None
         self._motion = motion
+        self._swept_only = swept_only
         self._bodies = DeadBodies(motion, dead)
         self._latest = motion.position, 0.0  # where the latest step began, and its heading [rad]
         self._wall_rad = 0.0
@@ -111,7 +112,7 @@ class WallWalk:
         way, end = self._begin_near(hand), STRETCH
         if not (yield from self._go_past(way, lambda: math.dist(start, motion.position) >= clear_m)):
             end = SHUT
-            yield from motion.drive_to(start)
+            yield from self._drive_back(way)
         elif half_rad > 0.0:
             edge = past_edge(lambda: motion.position, self.radius_m, bearing_rad, hand, half_rad, start)
             yield from self._go_past(way, edge, EDGE_M_MAX)
@@ -130,12 +131,20 @@ class WallWalk:
         way = self._begin_near(hand)
         edge = past_edge(lambda: motion.position, self.radius_m, bearing_rad, hand, half_rad, start, CLEAR_M)
         end = STRETCH if (yield from self._go_past(way, edge, EDGE_M_MAX)) else SHUT
-        yield from motion.drive_to(start)
+        yield from self._drive_back(way)
         return self._end_near(way, end, done)
+
+    def _drive_back(self, way: NearWay) -> Generator[BodyVelocity, None, None]:
+        """Drive back to the start of a way close to it."""
+        driven = list[Vector]()
+        for velocity in self._motion.drive_to(self._start):
+            yield velocity
+            driven.append(self._motion.position)
+        way.close(driven)
 
     def _begin_near(self, hand: int) -> NearWay:
         """Begin to record the way along a wall from here, close to the start, with the wall at the hand."""
-        way = self._way_near = NearWay(self._start, hand, self.radius_m)
+        way = self._way_near = NearWay(self._start, hand, self.radius_m, self._swept_only)
         self._near_points = self._held_points(way.waypoints.append)
         self._in_reach.begin()
         self._report(self._near_points)
