@@ -91,7 +91,10 @@ def test_a_wall_followed_close_to_a_slot_closes_directions_up_to_the_touched_poi
 
 
 def test_a_wall_close_to_a_slot_may_end_past_the_last_touched_point_but_not_where_the_way_begins() -> None:
-    """At the begin, at 0 degrees, the robot meets the same wall with its other hand, and 3 degrees are closed there."""
+    """At the begin, at 0 degrees, the robot meets the same wall with its other hand, and closes 3 degrees there.
+
+    So it does not at a second stretch.
+    """
     way = [NearPoint((0.13, 0.05 * each), (0.0,)) for each in range(7)]
     leaving = [NearPoint((0.05 * each, 0.3), ()) for each in (0, -3, -6)]
     again = [NearPoint((-0.13, 0.3 - 0.05 * each), (math.pi,)) for each in range(7)]
