@@ -200,16 +200,6 @@ def test_a_wall_counts_only_where_no_corner_may_hide_it(
     assert is_open_at(closed_by(way), 35.0) is is_open
 
 
-def test_a_way_that_begins_at_a_jamb_closes_little_beside_it() -> None:
-    """The robot touches the jamb of a mouth in the south, 0.09 m away, and follows the wall to the north."""
-    way = NearWay(SLOT, -1, RADIUS_M)
-    for number in range(4):
-        way.take(NearPoint((0.02, 0.05 * number), EAST))
-    assert not is_open_at(closed_by(way), 10.0)
-    assert not is_open_at(closed_by(way), -2.0)
-    assert is_open_at(closed_by(way), -6.0)
-
-
 def test_a_triangle_across_one_of_robots_closes_nothing() -> None:
     """The third robot, at 165 degrees, is beyond the line from the other one to the point: that relies on slot 0 there."""
     assert is_closed(open_at_slot(origin=0, way=WAY[2:], third=(-0.5, 0.13)), 160.0)

@@ -41,9 +41,6 @@ WEDGED_M: Final = 0.005
 # The place of a touched point is known within this part of a body's radius, by the width of a switch. So far a wall goes on
 # beyond it: two walks from the same slot that begin at the same point leave no gap.
 OVERHANG: Final = math.sin(CONTACT_RAD)
-# Two walks from a slot that begin at the same touched point leave no gap of more than twice this [rad]. More of the wall's end
-# may be an opening, of which a robot close to it touches a jamb.
-BEGIN_RAD: Final = math.radians(3.0)
 # A line of sight back to the start may leave the way on the side away from the wall by this part of a body's radius: a whole
 # radius, less the error of the place of a touched point.
 FREE: Final = 1.0 - OVERHANG
@@ -201,8 +198,7 @@ def _followed(
         seen = list(zip(points[part], in_sight[part], swept[part], strict=True))
         yield from _arcs_of_stretch(start, seen, stretch.ends, hand)
         if stretch.is_clear[0] and _begins_way(stretch, 0):
-            first, width = _arc_past(start, stretch.ends[0], hand, radius_m)
-            yield first, math.copysign(min(abs(width), BEGIN_RAD), width)
+            yield _arc_past(start, stretch.ends[0], hand, radius_m)
 
 
 def _positive(arcs: Iterable[tuple[float, float]]) -> NearArcs:

@@ -27,13 +27,10 @@ DOOR = building(
     "[[0,0],[1.2,0],[1.2,0.5],[1.3,0.5],[1.3,0],[2.5,0],[2.5,1.2],[1.3,1.2],[1.3,0.7],[1.2,0.7],[1.2,1.2],[0,1.2]]",
     (1.15, 1.33, 0.45, 0.75),
 )
-BEND_ROOMS = (
-    "[[0,0],[1.2,0],[1.2,0.5],[1.6,0.5],[1.6,1.2],[2.6,1.2],[2.6,2.2],[1.4,2.2],[1.4,0.7],[1.2,0.7],[1.2,1.2],[0,1.2]]"
+BEND = building(
+    "[[0,0],[1.2,0],[1.2,0.5],[1.6,0.5],[1.6,1.2],[2.6,1.2],[2.6,2.2],[1.4,2.2],[1.4,0.7],[1.2,0.7],[1.2,1.2],[0,1.2]]",
+    (1.36, 1.6, 0.5, 0.74),
 )
-BEND_BOX = (1.36, 1.6, 0.5, 0.74)
-BEND = building(BEND_ROOMS, BEND_BOX)
-# Before the first death a robot stands close to the jamb of the passage.
-LATER = building(BEND_ROOMS, BEND_BOX, at_s=150.0)
 # A door of 0.25 m in a corner of both rooms.
 CORNER = building(
     "[[0,0],[1.2,0],[1.2,0.02],[1.3,0.02],[1.3,0],[2.5,0],[2.5,1.2],[1.3,1.2],[1.3,0.271],[1.2,0.271],[1.2,1.2],[0,1.2]]",
@@ -49,7 +46,6 @@ ALONE = ("services.path=gradient",)
     [
         pytest.param(DOOR, id="central door"),
         pytest.param(BEND, id="central bend"),
-        pytest.param(LATER, id="central bend, beside a robot close to the jamb"),
         pytest.param((*DOOR, *ALONE), id="decentralised door"),
         pytest.param((*BEND, *ALONE), id="decentralised bend"),
         pytest.param((*CORNER, *ALONE), id="decentralised door in a corner"),
