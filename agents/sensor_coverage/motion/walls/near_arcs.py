@@ -179,7 +179,7 @@ def _followed(
     stretches: Iterable[_Stretch],
     hand: int,
     radius_m: float,
-    swept_only: bool = False,
+    swept_only: bool,
 ) -> Iterator[tuple[float, float]]:
     """Yield the arcs (start, width) [rad] around a start in which walls were followed; see `walls_around`."""
     way = [each.at for each in points]
