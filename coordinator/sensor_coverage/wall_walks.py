@@ -27,6 +27,7 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     FollowWall,
     FollowWallPastDead,
     Move,
+    NearWalls,
     Probe,
     ToWall,
     ToWallPastDead,
@@ -199,9 +200,8 @@ class WallWalks:
         near, beside = walked.near.turned(heading), turned_arcs(walked.near_beside, heading)
         # A robot that followed the wall and got neither past the arc nor clear has followed all walls around.
         kind = 0 if walked.end == SHUT else hand
-        self._walls.note_near(slot, near.followed, kind, robot)
-        self._walls.note_near(slot, near.past_ends, kind, robot, True)
-        self._walls.note_near(slot, beside, kind, ANYONE)
+        self._walls.note_near(slot, near, kind, robot)
+        self._walls.note_near(slot, NearWalls(beside), kind, ANYONE)
         if len(walked.waypoints) > 1:
             origin = Origin(slot, walked.start)
             way = walked.waypoints

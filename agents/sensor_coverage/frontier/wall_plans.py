@@ -4,7 +4,7 @@ The proof of coverage (`zwerm.agents.sensor_coverage.frontier.wall_proof`) finds
 """
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.decisions import CoverageProof
@@ -12,8 +12,9 @@ from zwerm.agents.sensor_coverage.frontier.plan import WALLS, Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import united_round
+from zwerm.agents.sensor_coverage.frontier.strips.way_begins import begin_width
 from zwerm.agents.sensor_coverage.frontier.wall_proof import ANYONE, Arc, NearArc, contains
-from zwerm.agents.sensor_coverage.messages.commands import NearArcs
+from zwerm.agents.sensor_coverage.messages.commands import NearArcs, NearWalls
 
 # Fourth element of the keys of plans to join two parts of the swarm.
 JOIN: Final = 2000
@@ -208,19 +209,23 @@ class WallPlans:
         else:
             self.tried.setdefault(plan.mover, []).append(plan.direction)
 
-    def note_near(self, slot: int, arcs: NearArcs, hand: int, robot: int = ANYONE, are_past_ends: bool = False) -> None:
-        """Record arcs (start, width) [rad] around a slot in which a wall close to it was followed, with a hand at it.
+    def note_near(self, slot: int, walls: NearWalls, hand: int, robot: int = ANYONE) -> None:
+        """Record walls close to a slot that were followed, with a hand at them. They count for the robot (`NearArc`)."""
+        begins = [Arc(*each) for each in walls.begins]
+        self._note_arcs(slot, (hand, robot, False), walls.followed, begins)
+        self._note_arcs(slot, (hand, robot, True), walls.past_ends)
 
-        The other arguments have the meaning of the fields of `NearArc`.
+    def _note_arcs(self, slot: int, kind: tuple[int, int, bool], arcs: NearArcs, begins: Sequence[Arc] = ()) -> None:
+        """Record arcs (start, width) [rad] around a slot of one kind: its hand, its robot, and whether they are past ends.
 
         Arcs of different walks stay apart: where they meet, a wall may end and another one begin far behind it.
         """
         known = self._slots.near.get(slot, [])
-        kind = hand, robot, are_past_ends
-        same = [arc for arc, *its_kind in known if tuple(its_kind) == kind]
+        same = [each.arc for each in known if each.kind == kind]
         fresh = [each for each in united_round(Arc(*each) for each in arcs) if not contains(same, each)]
-        kept = [each for each in known if each[1:] != kind or not contains(fresh, each.arc)]
-        self._slots.note_near(slot, [*kept, *(NearArc(each, *kind) for each in fresh)])
+        kept = [each for each in known if each.kind != kind or not contains(fresh, each.arc)]
+        added = (NearArc(each, *kind, begin_width(each, kind[0], begins)) for each in fresh)
+        self._slots.note_near(slot, [*kept, *added])
 
 
 def _edge_at_wall(arc: Arc, robots: Collection[float]) -> int:

@@ -77,12 +77,19 @@ class NearArc(NamedTuple):
     """An arc around a slot in which its robot followed a wall close to it, with the wall at its `hand`, +1 left, -1 right.
 
     The hand is 0 if it followed all walls around. The arc counts for the `robot`, or for ANYONE. Past an end a wall may end.
+    The last `begin_rad` of the arc, at the edge where the robot's way along the wall begins, are beyond the touched point.
     """
 
     arc: Arc
     hand: int
     robot: int = ANYONE
     is_past_end: bool = False
+    begin_rad: float = 0.0
+
+    @property
+    def kind(self) -> tuple[int, int, bool]:
+        """The hand, the robot, and whether the arc is past an end."""
+        return self.hand, self.robot, self.is_past_end
 
 
 class WalkPoint(NamedTuple):

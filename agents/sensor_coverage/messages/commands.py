@@ -34,14 +34,16 @@ class NearWalls(NamedTuple):
     """The arcs around a slot in which its robot `followed` walls close to it, and those `past_ends` of them.
 
     A body does not pass beside the touched point at an end, but what is in sight there is not known: the wall may end.
+    `begins` are the parts of `followed` beyond the touched point where the way along a wall begins.
     """
 
     followed: NearArcs = ()
     past_ends: NearArcs = ()
+    begins: NearArcs = ()
 
     def turned(self, by: float) -> "NearWalls":
         """Return the same arcs turned by an angle [rad]."""
-        return NearWalls(turned_arcs(self.followed, by), turned_arcs(self.past_ends, by))
+        return NearWalls(*(turned_arcs(each, by) for each in self))
 
 
 def turned_arcs(arcs: NearArcs, by: float) -> NearArcs:

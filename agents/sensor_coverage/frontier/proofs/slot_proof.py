@@ -20,6 +20,7 @@ from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import (
 )
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     BLIND_MAX,
+    BODY_RAD,
     CONTACT_RAD,
     NEWS_RAD,
     Arc,
@@ -78,6 +79,7 @@ class SlotProof:
         self._scan = ScanResult({}, FlagComplex({}), ())
         self._by_view: list[Arc] = []
         self._touched: tuple[float, ...] = ()
+        self._in_touch: list[int] = []  # the slots of robots in touch
         self._at_walls: list[Arc] = []  # arcs of walls in touch
         self._contacts: list[Arc] = []  # the directions of their contacts
         self._near: list[Arc] = []  # arcs in which a wall close to the slot was followed
@@ -110,7 +112,8 @@ class SlotProof:
         self.around = {each: view[each] for each in scan.complex_.neighbours[slot]}
         self._touched = touched = tuple(touched)
         self._at_walls, self._contacts = arcs_of_walls(touched), arcs_of_walls(touched, CONTACT_RAD)
-        bodies = [there for each, there in self.around.items() if each in in_touch]
+        self._in_touch = [each for each in self.around if each in in_touch]
+        bodies = [self.around[each] for each in self._in_touch]
         self._by_view = list(arcs_of_robots(bodies, touched))
         for triangle in scan.complex_.triangles_at(slot):
             a, b = (each for each in triangle if each != slot)
@@ -124,7 +127,8 @@ class SlotProof:
 
     def _find_open(self) -> list[Arc]:
         standing, touched, stretches = self._scan.complex_.neighbours, self._touched, self._stretches.values()
-        fans = [Arc(each.start_rad, each.width_rad) for each in self._triangles.counting(standing)]
+        counting = (each for each in self._triangles.counting(standing) if not self._is_behind_body(each.triangle))
+        fans = [Arc(each.start_rad, each.width_rad) for each in counting]
         followed = [arc for each in stretches for arc in each.arcs(standing, touched)]
         walks = self._by_walks.counting((*standing, NOWHERE))
         opened = complement([*self._by_view, *fans, *self._at_walls, *self._near, *walks, *followed])
@@ -139,6 +143,10 @@ class SlotProof:
         edged = [arc for each in stretches for arc in each.edged_arcs(standing, touched)]
         edged += without_edges([*contacts, *near], loose)
         return complement([*self._by_view, *fans, *self._by_walks.counting(standing), *edged])
+
+    def _is_behind_body(self, triangle: WalkTriangle | None) -> bool:
+        """Return whether the other slot of a triangle sees the point behind this robot in touch: it relies on this slot."""
+        return triangle is not None and triangle.beside in self._in_touch and triangle.there_rad <= BODY_RAD
 
     def _open_rad(self) -> float:
         """Return the sum of all open arcs [rad], and a turn more unless only edges of sight are open."""

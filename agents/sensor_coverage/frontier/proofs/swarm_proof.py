@@ -6,6 +6,7 @@ A walk ends where no standing robot sees it, and the deployment goes on from the
 the robots that saw it. When one of them is gone, nothing is known of its part: the points that it saw close nothing.
 """
 
+import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Final, NamedTuple
@@ -27,7 +28,9 @@ from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import (
     shortened,
     with_islands,
 )
+from zwerm.agents.sensor_coverage.frontier.strips.way_begins import between_begins
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
+    BODY_RAD,
     CONTACT_RAD,
     Arc,
     Crossing,
@@ -326,9 +329,10 @@ class SwarmProof:
         for (first_number, _), (hand, pocket) in beside.items():
             is_loose = not pocket.other.is_tied(self._neighbours)
             crossings.setdefault(first_number, []).extend(crossings_of_pocket(hand, pocket, is_loose))
+        near = between_begins(around.near)
         by_stretch = self._by_stretch[slot] = {number: arcs_into(each) for number, each in crossings.items()}
-        self._edged[slot] = edged_arcs(by_stretch, edges, contacts, shortened(around.near), dark)
-        found = (*contacts, *(each.arc for each in around.near), *(arc for each in by_stretch.values() for arc in each))
+        self._edged[slot] = edged_arcs(by_stretch, edges, contacts, shortened(near), dark)
+        found = (*contacts, *(each.arc for each in near), *(arc for each in by_stretch.values() for arc in each))
         return united(found)
 
     def _counts(self, point: WalkPoint) -> bool:
@@ -344,8 +348,16 @@ class SwarmProof:
         standing = [slot for slot in point.seen if slot in self._neighbours]
         at_walls = {(slot, side): self._ends_beyond(slot, number, side) for slot in standing for side in (1, -1)}
         views, origins = self._views, self._origins
-        beside = origins.beside(number, views)
-        return self._triangles.find(number, point, views, self._neighbours, self._versions, at_walls, beside)
+        without = *origins.beside(number, views), *self._behind_bodies(point, standing)
+        return self._triangles.find(number, point, views, self._neighbours, self._versions, at_walls, without)
+
+    def _behind_bodies(self, point: WalkPoint, standing: Iterable[int]) -> Iterator[Pair]:
+        """Yield (slot, other) if the other slot sees a point behind the slot's robot in touch: there it relies on the slot."""
+        for other in standing:
+            view, there = self._views[other], point.seen[other]
+            for slot in self._around[other].in_touch:
+                if slot in point.seen and abs(math.remainder(view[slot] - there, math.tau)) <= BODY_RAD:
+                    yield slot, other
 
     def _is_proved(self, slot: int, there: float, other: int) -> bool:
         """Return whether a slot stands, and walls or triangles of robots without another slot close its direction [rad].

@@ -140,7 +140,7 @@ def shortened(near: Iterable[NearArc]) -> list[Arc]:
     """
     return [
         Arc(arc.start_rad + max(hand, 0) * BESIDE_EDGE_RAD, arc.width_rad - abs(hand) * BESIDE_EDGE_RAD)
-        for arc, hand, _, is_past_end in near
+        for arc, hand, _, is_past_end, _ in near
         if not is_past_end and arc.width_rad > abs(hand) * BESIDE_EDGE_RAD
     ]
 

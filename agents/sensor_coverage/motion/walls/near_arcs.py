@@ -135,7 +135,13 @@ def walls_around(
         for number, is_clear in enumerate(stretch.is_clear)
         if is_clear and not _begins_way(stretch, number)
     )
-    return NearWalls(_positive(_followed(start, points, stretches, hand, radius_m, swept_only)), _positive(past_ends))
+    begins = (
+        _arc_past(start, stretch.ends[0], hand, radius_m)
+        for stretch in stretches
+        if stretch.is_clear[0] and _begins_way(stretch, 0)
+    )
+    followed = _followed(start, points, stretches, hand, radius_m, swept_only)
+    return NearWalls(*map(_positive, (followed, past_ends, begins)))
 
 
 def _stretches(points: Sequence[NearPoint], hand: int, radius_m: float) -> Iterator[_Stretch]:

@@ -172,7 +172,9 @@ class WallPush:
             if not at_base:
                 self._map.note_near(near)
             self._situation.stand()
-            self.close(PushAborted(self.id, True, *near) if at_base else PushAborted(self.id, True))
+            self.close(
+                PushAborted(self.id, True, near.followed, near.past_ends) if at_base else PushAborted(self.id, True)
+            )
             return
         self._walks = result.end != OPEN
         self._anchors = () if self._walks else self._find_anchors()
@@ -180,7 +182,7 @@ class WallPush:
         self._enter("out")
         self._behind_settled = self._chain.is_rear
         self.cleared()
-        self._write(AllStanding(self.id, *near))
+        self._write(AllStanding(self.id, near.followed, near.past_ends))
 
     def _go_on(self) -> None:
         """Correct the scale, or follow the wall."""

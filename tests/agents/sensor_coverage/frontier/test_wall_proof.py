@@ -20,6 +20,7 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     leaves_wall,
 )
 from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
+from zwerm.agents.sensor_coverage.messages.pushes import ProvedArc, WalkTriangle
 from zwerm.agents.sensor_coverage.protocols.walls.sightlines import RESENT_POINTS, Sightlines
 from zwerm.maths.simplicial import FlagComplex
 
@@ -233,6 +234,32 @@ def test_a_robot_in_touch_closes_what_its_body_hides(walls_deg: tuple[int, ...],
     local = SlotProof()
     local.update(0, scan, walls, (1,))
     assert math.degrees(open_rad(local)) == pytest.approx(open_deg)
+
+
+@pytest.mark.parametrize(
+    ("there_deg", "open_deg"),
+    [
+        pytest.param(-160, (310 - 25, 360 - 70 - 25), id="slot 1 sees the point behind the body: it relies on slot 0"),
+        pytest.param(-150, (310 - 45, 360 - 70 - 25), id="slot 1 sees the point beside the body"),
+    ],
+)
+def test_the_triangle_with_a_point_behind_a_body_in_touch_does_not_count(
+    there_deg: int, open_deg: tuple[int, int]
+) -> None:
+    """A walk leads past two robots in touch."""
+    points = [
+        WalkPoint({0: math.radians(-70.0)}, SOUTH, ()),
+        *between_two((-45, there_deg)),
+        WalkPoint({1: math.radians(-110.0)}, SOUTH, ()),
+    ]
+    scan, proof = ScanResult(PAIR, FlagComplex(PAIR), ()), SwarmProof()
+    proof.update(scan, (Walk(0, -1, tuple(points)),), {}, {}, {0: (1,), 1: (0,)})
+    assert tuple(_degrees(proof.open_arcs()).values()) == open_deg
+    triangle = WalkTriangle(1, 1, math.radians(there_deg + 180.0), 0, 0, 1, -1)
+    local = SlotProof()
+    local.inherit([ProvedArc((1,), (1,), math.radians(-45.0), math.radians(45.0), triangle)])
+    local.update(0, scan, (), (1,))
+    assert math.degrees(open_rad(local)) == pytest.approx(open_deg[0] + 25.0), "no step of the walk closes 25 degrees"
 
 
 def test_a_wall_that_ends_before_a_point_of_another_walk_closes_no_triangle_with_it() -> None:

@@ -56,3 +56,9 @@ def test_a_dead_body_in_an_opening_hides_no_room(settings: tuple[str, ...]) -> N
     result = run("sensor-coverage-narrow", 1, "inline", settings, watcher=UntilInSight())
     assert result.metrics["faults_missed"] == 0.0
     assert result.outcome != "completed" or result.metrics["reachable_coverage_fraction"] >= 0.98
+
+
+def test_a_jamb_beside_a_robot_hides_no_bend() -> None:
+    """The robot's ways along the wall begin at the jamb, one on each side of it."""
+    result = run("sensor-coverage-narrow", 1, "inline", (*BEND[:-1], "time.duration_s=4000.0"), watcher=UntilInSight())
+    assert result.metrics["reachable_coverage_fraction"] >= 0.98

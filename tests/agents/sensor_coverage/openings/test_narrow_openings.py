@@ -46,6 +46,7 @@ def test_a_narrow_opening_is_not_passed_by(seed: int, dies: bool, more: tuple[st
         pytest.param(769, 1, False, NOISE, id="noise, a chicane of 1.7 bodies, along whose mouth a robot looks"),
         pytest.param(769, 1, False, EXACT, id="a chicane of 1.7 bodies, whose corner hides a wall that was followed"),
         pytest.param(770, 1, False, EXACT, id="a corner, which hides a wall that was followed"),
+        pytest.param(777, 2, True, NOISE, id="noise, a body in a chicane of 1.4 bodies before two robots in touch"),
         pytest.param(776, 3, True, EXACT, id="a body in a bend of 1.8 bodies beside three robots in line"),
     ],
 )
