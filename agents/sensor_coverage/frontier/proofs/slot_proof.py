@@ -8,6 +8,8 @@ from typing import Final, NamedTuple
 from zwerm.agents.sensor_coverage.frontier.fans import fan_of, side_of
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.frontier.proofs.chosen_triangles import ChosenTriangles
+from zwerm.agents.sensor_coverage.frontier.proofs.slot_memory import remembered
+from zwerm.agents.sensor_coverage.frontier.proofs.unseen_directions import UnseenDirections
 from zwerm.agents.sensor_coverage.frontier.proofs.walk_arcs import WalkArcs
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStretch
 from zwerm.agents.sensor_coverage.frontier.strips.seen_stretch import SeenStep, SeenStretch, SeenTouch
@@ -40,12 +42,6 @@ from zwerm.agents.sensor_coverage.messages.pushes import LostSight, ProvedArc, W
 from zwerm.maths.simplicial import FlagComplex
 from zwerm.maths.sums import added
 
-# Arcs of walks that a slot's next occupant learns, and their greatest length in a message: the command has a greatest length.
-MEMORY_MAX: Final = 300
-MEMORY_BYTES_MAX: Final = 45_000
-# Greatest length of an arc and its triangle in a message, without its slots, and that of a slot.
-ARC_BYTES: Final = 60
-SLOT_BYTES: Final = 5
 # Edges of sight that a slot's next occupant learns, and the most slots named in each: witnesses, and slots that saw the walk.
 EDGES_MAX: Final = 40
 EDGE_SLOTS_MAX: Final = 8
@@ -84,6 +80,7 @@ class SlotProof:
         self._contacts: list[Arc] = []  # the directions of their contacts
         self._near: list[Arc] = []  # arcs in which a wall close to the slot was followed
         self._by_walks = WalkArcs()
+        self._unseen = UnseenDirections()
         self._triangles = ChosenTriangles()
         self._edges: dict[SightEnd, None] = {}
         self._sights: dict[int, _Sight] = {}  # by walk, until the slot loses sight of it
@@ -127,7 +124,7 @@ class SlotProof:
 
     def _find_open(self) -> list[Arc]:
         standing, touched, stretches = self._scan.complex_.neighbours, self._touched, self._stretches.values()
-        counting = (each for each in self._triangles.counting(standing) if not self._is_behind_body(each.triangle))
+        counting = [each for each in self._triangles.counting(standing) if self._relies_on_other(each)]
         fans = [Arc(each.start_rad, each.width_rad) for each in counting]
         followed = [arc for each in stretches for arc in each.arcs(standing, touched)]
         walks = self._by_walks.counting((*standing, NOWHERE))
@@ -144,9 +141,17 @@ class SlotProof:
         edged += without_edges([*contacts, *near], loose)
         return complement([*self._by_view, *fans, *self._by_walks.counting(standing), *edged])
 
-    def _is_behind_body(self, triangle: WalkTriangle | None) -> bool:
-        """Return whether the other slot of a triangle sees the point behind this robot in touch: it relies on this slot."""
-        return triangle is not None and triangle.beside in self._in_touch and triangle.there_rad <= BODY_RAD
+    def _relies_on_other(self, arc: ProvedArc) -> bool:
+        """Return whether the other slot of a triangle answers for the space beyond: it does not where it relies on this one.
+
+        It does where it sees the point behind this robot in touch, or saw nothing of walks in the angle here.
+        """
+        triangle = arc.triangle
+        if triangle is None:
+            return True
+        if triangle.beside in self._in_touch and triangle.there_rad <= BODY_RAD:
+            return False
+        return not self._unseen.within(triangle.beside, Arc(arc.start_rad, arc.width_rad))
 
     def _open_rad(self) -> float:
         """Return the sum of all open arcs [rad], and a turn more unless only edges of sight are open."""
@@ -170,6 +175,9 @@ class SlotProof:
         slot, (before, point, hand, witnesses, number) = self._slot, step
         if before is None or before is not self._stretch_end or witnesses:
             self._stretch = []
+        if all(each == slot for each in _witnesses_of(point)):
+            for each in self.around:
+                self._unseen.note(each, point.seen[slot])
         self._stretch += arcs_of_step(slot, before, point, hand)
         self._stretch_end = point
         if hidden:
@@ -352,27 +360,22 @@ class SlotProof:
         kept = (ProvedArc(*key, *arc) for key, arc in self._by_walks.all())
         followed = (arc for each in self._stretches.values() for arc in each.keyed_arcs(self._touched))
         ended = (ProvedArc(self._others(needed), self._others(seen), *arc) for needed, seen, arc in followed)
-        found = (*near, *kept, *self._triangles.all(), *ended)
-        if len(found) <= MEMORY_MAX and _bytes_of(found) <= MEMORY_BYTES_MAX:
-            return found
-        found = tuple(sorted(found, key=lambda each: len(each.needed) + len(each.seen))[:MEMORY_MAX])
-        while _bytes_of(found) > MEMORY_BYTES_MAX:
-            found = found[:-1]
-        return found
+        triangles = filter(self._relies_on_other, self._triangles.all())
+        return remembered((*near, *kept, *triangles, *ended))
 
     def inherit(self, memory: Iterable[ProvedArc], edges: Iterable[LostSight] = ()) -> None:
         """Take over the arcs that walks closed, and the edges of sight, from the slot's former occupant."""
         self._open = None
-        self._near, self._by_walks, self._triangles = [], WalkArcs(), ChosenTriangles()
+        self._near, self._by_walks, self._triangles, self._unseen = (
+            [],
+            WalkArcs(),
+            ChosenTriangles(),
+            UnseenDirections(),
+        )
         self._stretches, self._touches, self._sights = {}, {}, {}
         self._edges = {SightEnd(*each): None for each in edges}
         for each in memory:
             self._take(each)
-
-
-def _bytes_of(arcs: Iterable[ProvedArc]) -> int:
-    """Return the greatest length of arcs in a message."""
-    return sum(ARC_BYTES + SLOT_BYTES * (len(each.needed) + len(each.seen)) for each in arcs)
 
 
 def _arc_of_triangle(slot: int, other: int, point: WalkPoint, views: Mapping[int, Mapping[int, float]]) -> Arc:

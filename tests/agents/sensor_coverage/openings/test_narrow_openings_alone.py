@@ -36,12 +36,26 @@ def test_robots_alone_pass_by_no_narrow_opening(seed: int, dies: bool, more: tup
 
 
 @pytest.mark.parametrize(
-    ("seed", "run_seed"),
+    ("seed", "run_seed", "dies", "more"),
     [
-        pytest.param(736, 1, id="a door of 1.3 bodies: a standing robot touches one jamb, and a walking one the other"),
-        pytest.param(751, 2, id="a bend of 1.6 bodies, where a walking robot pushed the only one that saw it"),
+        pytest.param(
+            736, 1, False, NOISE, id="noise, a door: a standing robot touches one jamb, and a walking one the other"
+        ),
+        pytest.param(
+            751,
+            2,
+            False,
+            NOISE,
+            id="noise, a bend of 1.6 bodies, where a walking robot pushed the only one that saw it",
+        ),
+        pytest.param(
+            770, 1, True, NOISE, id="noise, a body in a chicane of 1.7 bodies in which a robot alone saw walks"
+        ),
+        pytest.param(722, 1, True, EXACT, id="a body, and three robots that rely on each other in a circle"),
     ],
 )
-def test_robots_alone_pass_by_no_narrow_opening_with_noise_and_other_seeds_of_the_run(seed: int, run_seed: int) -> None:
-    result = carry_out(seed, False, (*ALONE, NOISE), UntilInSight(), run_seed)
+def test_robots_alone_pass_by_no_narrow_opening_with_other_seeds_of_the_run(
+    seed: int, run_seed: int, dies: bool, more: str
+) -> None:
+    result = carry_out(seed, dies, (*ALONE, more), UntilInSight(), run_seed)
     assert result.outcome != "completed" or result.metrics["reachable_coverage_fraction"] >= 0.98
