@@ -175,9 +175,9 @@ class SlotProof:
         slot, (before, point, hand, witnesses, number) = self._slot, step
         if before is None or before is not self._stretch_end or witnesses:
             self._stretch = []
-        if all(each == slot for each in _witnesses_of(point)):
-            for each in self.around:
-                self._unseen.note(each, point.seen[slot])
+        if _witnesses_of(point) == (slot,):
+            for neighbour in self.around:
+                self._unseen.note(neighbour, point.seen[slot])
         self._stretch += arcs_of_step(slot, before, point, hand)
         self._stretch_end = point
         if hidden:
