@@ -15,6 +15,7 @@ from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import united_round
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, Origin, Walk, contains, turned_vector
 from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
 from zwerm.agents.sensor_coverage.motion.walls.near_arcs import (
+    FollowedWay,
     NearPoint,
     NearWay,
     arcs_around_all,
@@ -73,7 +74,7 @@ def near_arcs(way: Way) -> list[NearArc]:
     points = [NearPoint(at, walls) for at, walls in way]
     return [
         NearArc(each, -1)
-        for each in united_round(Arc(*one) for one in walls_around(SLOT, points, -1, RADIUS_M).followed)
+        for each in united_round(Arc(*one) for one in walls_around(SLOT, FollowedWay(points, -1, RADIUS_M)).followed)
     ]
 
 
@@ -156,14 +157,16 @@ def test_walls_that_another_robot_at_a_slot_knows_are_closed_wherever_it_stands(
     points += [NearPoint((0.3, RADIUS_M - wall_m + 0.01 * each), EAST) for each in range(1, 31)]
     places = places_beside(SLOT, points, RADIUS_M)
     assert all(y > -wall_m + 0.6 * RADIUS_M for _, y in places), "no body is in the wall"
-    closed = united_round(Arc(*each) for each in arcs_around_all(places, points, -1, RADIUS_M))
-    here = united_round(Arc(*each) for each in walls_around(SLOT, points, -1, RADIUS_M).followed)
+    closed = united_round(Arc(*each) for each in arcs_around_all(places, FollowedWay(points, -1, RADIUS_M)))
+    here = united_round(Arc(*each) for each in walls_around(SLOT, FollowedWay(points, -1, RADIUS_M)).followed)
     assert math.radians(20.0) < sum(each.width_rad for each in closed) < sum(each.width_rad for each in here)
     tight = [Arc(each.start_rad + TOLERANCE_RAD, each.width_rad - 2.0 * TOLERANCE_RAD) for each in closed]
     for number in range(60):
         x, y = 0.05 * math.cos(0.4 * number), 0.05 * math.sin(0.4 * number)
         if y > -wall_m + RADIUS_M:
-            there = united_round(Arc(*each) for each in walls_around((x, y), points, -1, RADIUS_M).followed)
+            there = united_round(
+                Arc(*each) for each in walls_around((x, y), FollowedWay(points, -1, RADIUS_M)).followed
+            )
             assert all(contains(there, each) for each in tight if each.width_rad > 0.0), (x, y)
 
 

@@ -13,7 +13,7 @@ from zwerm.agents.sensor_coverage.motion.locomotion import Locomotion
 from zwerm.agents.sensor_coverage.motion.motion_parameters import RobotParameters
 from zwerm.agents.sensor_coverage.motion.odometry_frame import OdometryFrame, Touched
 from zwerm.agents.sensor_coverage.motion.triangulation import distances_m
-from zwerm.agents.sensor_coverage.motion.walls.near_arcs import NearPoint, walls_around
+from zwerm.agents.sensor_coverage.motion.walls.near_arcs import FollowedWay, NearPoint, walls_around
 from zwerm.agents.sensor_coverage.motion.walls.wall_heading import swept
 from zwerm.agents.sensor_coverage.motion.walls.wall_walk import WEDGED_TICKS, WalkResult, WallWalk
 from zwerm.run.runner import run
@@ -51,7 +51,7 @@ def test_a_robot_goes_into_an_opening_at_its_hand() -> None:
 
 def all_around(way: Sequence[NearPoint], hand: int) -> list[tuple[float, float]]:
     """Return the arcs (start, width) [rad] around the origin of the walls along a way, and of what is past their ends."""
-    found = walls_around((0.0, 0.0), way, hand, 0.07)
+    found = walls_around((0.0, 0.0), FollowedWay(way, hand, 0.07))
     return [*found.followed, *found.past_ends]
 
 
@@ -95,7 +95,10 @@ def test_a_wall_close_to_a_slot_may_end_past_the_last_touched_point_but_not_wher
     way = [NearPoint((0.13, 0.05 * each), (0.0,)) for each in range(7)]
     leaving = [NearPoint((0.05 * each, 0.3), ()) for each in (0, -3, -6)]
     again = [NearPoint((-0.13, 0.3 - 0.05 * each), (math.pi,)) for each in range(7)]
-    one, two = walls_around((0.0, 0.0), way, -1, 0.07), walls_around((0.0, 0.0), [*way, *leaving, *again], -1, 0.07)
+    one, two = (
+        walls_around((0.0, 0.0), FollowedWay(way, -1, 0.07)),
+        walls_around((0.0, 0.0), FollowedWay([*way, *leaving, *again], -1, 0.07)),
+    )
     last = united_round(Arc(*each) for each in one.followed)
     assert [(round(math.degrees(a)) - 360, round(math.degrees(a + width)) - 360) for a, width in last] == [(-5, 56)]
     assert [(round(math.degrees(a)), round(math.degrees(a + width))) for a, width in one.past_ends] == [(56, 58)]

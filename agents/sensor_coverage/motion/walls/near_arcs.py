@@ -61,6 +61,18 @@ class NearPoint(NamedTuple):
     at_robot: bool = False
 
 
+class FollowedWay(NamedTuple):
+    """The points of a way along a wall at a `hand` (+1 left, -1 right), of a body with a radius [m].
+
+    With `swept_only` a wall counts only where no corner may hide it from the start.
+    """
+
+    points: Sequence[NearPoint]
+    hand: int
+    radius_m: float
+    swept_only: bool = False
+
+
 class NearWay:
     """The way of a robot along a wall from a `start` [m], with the wall at its hand: what it touched, and what it saw there.
 
@@ -88,12 +100,15 @@ class NearWay:
 
     def walls(self) -> NearWalls:
         """Return the arcs (start, width) [rad] around the start that the way closes."""
-        return walls_around(self._start, self._points, self.hand, self._radius_m, self._swept_only)
+        return walls_around(self._start, self._followed())
 
     def arcs_beside(self) -> NearArcs:
         """Return the arcs (start, width) [rad] that the way closes around each place where another robot may stand."""
         places = places_beside(self._start, self._points, self._radius_m)
-        return arcs_around_all(places, self._points, self.hand, self._radius_m, self._swept_only)
+        return arcs_around_all(places, self._followed())
+
+    def _followed(self) -> FollowedWay:
+        return FollowedWay(self._points, self.hand, self._radius_m, self._swept_only)
 
     def seen_from_start(self) -> list[Waypoint]:
         """Return the waypoints from the first one that has a direction from the start."""
@@ -114,9 +129,7 @@ class _Stretch(NamedTuple):
     is_clear: tuple[bool, bool]
 
 
-def walls_around(
-    start: Vector, points: Sequence[NearPoint], hand: int, radius_m: float, swept_only: bool = False
-) -> NearWalls:
+def walls_around(start: Vector, way: FollowedWay) -> NearWalls:
     """Return the walls around a start that were followed in touch, by odometry.
 
     Two successive points close the arc between them, if the wall is beyond, up to the touched points at the ends of a stretch
@@ -125,27 +138,23 @@ def walls_around(
     same wall there with its other hand. Two successive contacts with the same wall close the arc
     between the touched points of the wall. So do two contacts at the same point, because a body does not pass between them:
     those of a corner, or of a wedge from which the robot turned back. A dead robot may fill an opening: from there on only
-    the same wall closes an arc, up to the next wall. A step from one wall to the opposite one closes nothing. With `swept_only`
-    nor does a wall that a corner on the other side of the way may hide from the start.
+    the same wall closes an arc, up to the next wall. A step from one wall to the opposite one closes nothing.
     """
-    stretches = list(_stretches(points, hand, radius_m))
+    stretches = list(_stretches(way))
     past_ends = (
-        _arc_past(start, stretch.ends[number], hand if number == 0 else -hand, radius_m)
+        _arc_past(start, stretch.ends[number], way.hand if number == 0 else -way.hand, way.radius_m)
         for stretch in stretches
         for number, is_clear in enumerate(stretch.is_clear)
         if is_clear and not _begins_way(stretch, number)
     )
-    begins = (
-        _arc_past(start, stretch.ends[0], hand, radius_m)
-        for stretch in stretches
-        if stretch.is_clear[0] and _begins_way(stretch, 0)
+    return NearWalls(
+        *map(_positive, (_arcs_followed(start, way, stretches), past_ends, _begins(start, way, stretches)))
     )
-    followed = _followed(start, points, stretches, hand, radius_m, swept_only)
-    return NearWalls(*map(_positive, (followed, past_ends, begins)))
 
 
-def _stretches(points: Sequence[NearPoint], hand: int, radius_m: float) -> Iterator[_Stretch]:
+def _stretches(way: FollowedWay) -> Iterator[_Stretch]:
     """Yield the stretches of wall along a way that have two points in touch with the wall at least."""
+    points, hand, radius_m, _ = way
 
     def stretch(first: int, last: int, is_clear: tuple[bool, bool]) -> Iterator[_Stretch]:
         touching = [number for number in range(first, last + 1) if points[number].walls]
@@ -179,17 +188,19 @@ def _same_walls(before: NearPoint, point: NearPoint) -> Iterator[tuple[float, fl
     return ((a, b) for a in before.walls for b in point.walls if angle_between(a, b) < SAME_WALL_RAD)
 
 
-def _followed(
-    start: Vector,
-    points: Sequence[NearPoint],
-    stretches: Iterable[_Stretch],
-    hand: int,
-    radius_m: float,
-    swept_only: bool,
-) -> Iterator[tuple[float, float]]:
+def _begins(start: Vector, way: FollowedWay, stretches: Iterable[_Stretch]) -> Iterator[tuple[float, float]]:
+    """Yield the arc (start, width) [rad] beyond the touched point where a way begins, if no robot was in touch there."""
+    for stretch in stretches:
+        if stretch.is_clear[0] and _begins_way(stretch, 0):
+            yield _arc_past(start, stretch.ends[0], way.hand, way.radius_m)
+
+
+def _arcs_followed(start: Vector, way: FollowedWay, stretches: Sequence[_Stretch]) -> Iterator[tuple[float, float]]:
     """Yield the arcs (start, width) [rad] around a start in which walls were followed; see `walls_around`."""
-    way = [each.at for each in points]
-    swept = [not swept_only or is_swept(start, way[: number + 1], SWEPT * radius_m) for number in range(len(way))]
+    points, hand, radius_m, swept_only = way
+    places = [each.at for each in points]
+    upto = [places[: number + 1] for number in range(len(places))]
+    swept = [not swept_only or is_swept(start, each, SWEPT * radius_m) for each in upto]
     for number, each in enumerate(points):
         limit_rad = WEDGE_RAD if _turns_back(start, points, number) else CORNER_RAD
         for a, b in combinations(each.walls, 2) if swept[number] else ():
@@ -198,13 +209,12 @@ def _followed(
     for number, (before, point) in enumerate(pairwise(points), 1):
         for a, b in _same_walls(before, point) if swept[number] else ():
             yield _between(start, touched_point(before.at, a, radius_m), touched_point(point.at, b, radius_m))
-    in_sight = [start_in_sight(start, way[: number + 1], hand, radius_m) is not None for number in range(len(way))]
+    in_sight = [start_in_sight(start, each, hand, radius_m) is not None for each in upto]
     for stretch in stretches:
         part = slice(stretch.first, stretch.last + 1)
         seen = list(zip(points[part], in_sight[part], swept[part], strict=True))
         yield from _arcs_of_stretch(start, seen, stretch.ends, hand)
-        if stretch.is_clear[0] and _begins_way(stretch, 0):
-            yield _arc_past(start, stretch.ends[0], hand, radius_m)
+    yield from _begins(start, way, stretches)
 
 
 def _positive(arcs: Iterable[tuple[float, float]]) -> NearArcs:
@@ -220,16 +230,12 @@ def places_beside(start: Vector, points: Iterable[NearPoint], radius_m: float) -
     return [start, *(place for place in places if all(math.dist(place, each) > FREE * radius_m for each in touched))]
 
 
-def arcs_around_all(
-    places: Iterable[Vector], points: Sequence[NearPoint], hand: int, radius_m: float, swept_only: bool = False
-) -> NearArcs:
+def arcs_around_all(places: Iterable[Vector], way: FollowedWay) -> NearArcs:
     """Return the arcs (start, width) [rad] in which a wall was followed around each of some places; see `walls_around`."""
-    stretches = list(_stretches(points, hand, radius_m))
+    stretches = list(_stretches(way))
     shared = [Arc(0.0, math.tau)]
     for place in places:
-        closed = united(
-            Arc(*each) for each in _positive(_followed(place, points, stretches, hand, radius_m, swept_only))
-        )
+        closed = united(Arc(*each) for each in _positive(_arcs_followed(place, way, stretches)))
         shared = [part for each in shared for other in closed for part in shared_arcs(each, other)]
     return tuple(shared)
 
