@@ -7,6 +7,7 @@ from zwerm.agents.sensor_coverage.frontier.planner import Planner
 from zwerm.agents.sensor_coverage.frontier.proofs.slot_proof import SlotProof
 from zwerm.agents.sensor_coverage.frontier.wall_proof import mark_of
 from zwerm.agents.sensor_coverage.messages import advice, peers
+from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.agents.sensor_coverage.messages.commands import INCARNATIONS
 from zwerm.agents.sensor_coverage.motion.locomotion import STOP
 from zwerm.agents.sensor_coverage.motion.motion_parameters import RobotParameters
@@ -93,7 +94,10 @@ class LocalNode(Controller):
         return Command(drive=velocity, outbox=outbox, wake=self._wake(), telemetry=telemetry, snapshot=snapshot)
 
     def _lose_dead(self) -> None:
-        """Forget, once in each wave of the census, what robots saw of walks that it says are dead, wherever they stood."""
+        """Forget, once in each wave of the census, what robots saw of walks that it says are dead, wherever they stood.
+
+        A robot that died on its way to a slot counts as moving there, until this one is told.
+        """
         if self.completion.wave == self._wave:
             return
         self._wave = self.completion.wave
@@ -101,7 +105,8 @@ class LocalNode(Controller):
         self.situation.told_dead = dead
         if dead and proof.ready:
             before = proof.open_arcs()
-            proof.lose(*(mark_of(node) for node in dead))
+            slots = (self.local_map.slot_of(node) for node in dead)
+            proof.lose(*(mark_of(node) for node in dead), *(each for each in slots if each != NOWHERE))
             if proof.open_arcs() != before:
                 self.local_map.replan()
 
