@@ -29,8 +29,8 @@ WAY = ({ME: -70.0}, {ME: -45.0, NEIGHBOUR: -135.0}, {ME: -30.0, NEIGHBOUR: -110.
 STEPS_DEG, TRIANGLE_DEG = 40.0, 30.0
 
 
-def state(node: int, number: int, epoch: int, moving: bool, *seen: SeenRobot) -> StateBeacon:
-    return StateBeacon(number, SLOTS[node], epoch, moving, False, 1, seen, (), (), NO_PATH_VECTOR)
+def state(node: int, number: int, epoch: int, moving: bool, *seen: SeenRobot, displaced: bool = False) -> StateBeacon:
+    return StateBeacon(number, SLOTS[node], epoch, moving, False, 1, seen, (), (), NO_PATH_VECTOR, displaced=displaced)
 
 
 class Here:
@@ -60,9 +60,9 @@ class Here:
     def settled(self) -> bool:
         return bool(self.local_map.samples) and self.local_map.settled(self.sees, 0)
 
-    def hear_neighbour(self, number: int, epoch: int) -> None:
+    def hear_neighbour(self, number: int, epoch: int, displaced: bool = False) -> None:
         seen = SeenRobot(ME, self.local_map.epoch, SLOTS[ME], math.pi)
-        self.local_map.receive(NEIGHBOUR, state(NEIGHBOUR, number, epoch, False, seen), 0)
+        self.local_map.receive(NEIGHBOUR, state(NEIGHBOUR, number, epoch, False, seen, displaced=displaced), 0)
 
     def look(self) -> None:
         self.sees = {NEIGHBOUR: 0.0, WALKER: -0.3}
@@ -105,6 +105,22 @@ def test_a_kept_point_does_not_count_for_a_robot_that_has_moved_since() -> None:
     here.look()
     here.walls.poll(0)
     assert here.closed_deg == pytest.approx(STEPS_DEG), "the triangle with the neighbour does not count"
+
+
+@pytest.mark.parametrize("looks_first", [True, False])
+def test_a_neighbour_that_was_pushed_away_from_its_slot_is_no_witness(looks_first: bool) -> None:
+    here = Here()
+    here.hear_neighbour(2, 3, displaced=True)
+    if looks_first:
+        here.look()
+    here.watch_walk()
+    if not looks_first:
+        here.look()
+        here.walls.poll(0)
+    assert here.closed_deg == pytest.approx(STEPS_DEG), "the triangle with the neighbour does not count"
+    here.hear_neighbour(3, 3)
+    here.watch_walk()
+    assert here.closed_deg == pytest.approx(STEPS_DEG + TRIANGLE_DEG), "it is back"
 
 
 def test_kept_points_do_not_count_for_a_robot_that_has_moved_itself() -> None:
