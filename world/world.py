@@ -80,7 +80,11 @@ class World:
         self._sensing = Sensing(sensors)
         clock = scenario.robots.clock
         self.clocks = None if clock is None else Clocks(clock, robots, nodes, draws)
-        events = {each.field: WakeEvent(each.wake_event, each.signature) for each in sensors if each.wake_event}
+        events = {
+            each.field: WakeEvent(each.wake_event, each.signature, each.signature(each.rest()))
+            for each in sensors
+            if each.wake_event
+        }
         self._wakes = Wakes(nodes, dt_s, events)
         deadman_ticks = ticks(scenario.time.deadman_s, dt_s)
         self._lifecycle = Lifecycle(self.status, self._wakes, self.bodies, self.medium, self.completion, deadman_ticks)
@@ -258,8 +262,13 @@ class World:
         if not (self._wakes.watching and self.scene.moved.any()):
             return
         for field in self._wakes.events:
-            if len(watchers := self._wakes.watchers(field)):
-                self._wakes.note_readings(field, watchers, self._sensing.read(field, self.scene, watchers), self.tick)
+            watchers = self._wakes.watchers(field)
+            reach_m = self._sensing.reach_at_rest_m(field, self.scene)
+            if reach_m is not None:
+                watchers = watchers[~self._wakes.at_rest(field, watchers) | self.scene.moved_near(watchers, reach_m)]
+            if len(watchers):
+                readings = self._sensing.read(field, self.scene, watchers)
+                self._wakes.note_readings(field, watchers, readings, self.tick, reach_m is not None)
 
     def _apply(self, answers: Sequence[NodeAnswer]) -> list[tuple[int, tuple[Transmission, ...]]]:
         """Apply commands, and return the packets they send: (node, its outbox), in the order of `answers`."""

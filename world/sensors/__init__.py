@@ -77,6 +77,13 @@ class Sensor(ABC):
         """Return the part of a reading whose change is the sensor's wake event."""
         return None
 
+    def reach_at_rest_m(self, scene: Scene) -> float | None:
+        """Return a distance [m] if a reading `rest` stays until its robot moves, or a body does that is closer then.
+
+        None means that anything may change it.
+        """
+        return None
+
     def item_id(self, item: Any) -> int:
         """Return the number that identifies an item of a reading: by default its first field."""
         return int(msgspec.structs.astuple(item)[0])

@@ -108,6 +108,10 @@ class Touch(Sensor):
         """Return the bearings of the closed switches."""
         return tuple(contact.bearing_rad for contact in reading)
 
+    def reach_at_rest_m(self, scene: Scene) -> float | None:
+        """Return the distance [m] between two robots that touch, if the switches do not err."""
+        return 2.0 * scene.radius_m + self._reach_m + _ROUNDING_M if self.steady else None
+
     def item_id(self, item: Contact) -> int:
         """Return the number of the switch, counter-clockwise from straight ahead."""
         return self._number[item.bearing_rad]

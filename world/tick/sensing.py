@@ -51,6 +51,10 @@ class Sensing:
         sensor = self.sensors[field]
         return read(sensor, self.faults, scene, robots) if self.faults else sensor.read(scene, robots)
 
+    def reach_at_rest_m(self, field: str, scene: Scene) -> float | None:
+        """Return how far [m] a robot with nothing to sense is from bodies that change that, or None if more may change it."""
+        return None if self.faults else self.sensors[field].reach_at_rest_m(scene)
+
     def observations(
         self,
         scene: Scene,

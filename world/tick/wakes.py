@@ -19,10 +19,14 @@ NEVER: Final = math.inf
 
 
 class WakeEvent(NamedTuple):
-    """The event of one sensor: the field of `Wake` that requests it, and the part of a reading that changes."""
+    """The event of one sensor: the field of `Wake` that requests it, and the part of a reading that changes.
+
+    `rest` is that part where there is nothing to sense.
+    """
 
     asked_by: str
     signature: Callable[[Any], Hashable]
+    rest: Hashable = None
 
 
 class Wakes:
@@ -41,6 +45,8 @@ class Wakes:
         self._newest: dict[str, dict[int, Any]] = {field: {} for field in self.events}  # readings
         self._unmerged: dict[str, tuple[Sequence[int], Sequence[Any]]] = {}  # the newest of all nodes observed together
         self._seen: dict[str, dict[int, Any]] = {field: {} for field in self.events}  # signatures of watching nodes
+        # Sleepers with nothing to sense, compared at least once since they sleep.
+        self._at_rest: dict[str, Bools] = {field: np.zeros(count, dtype=np.bool_) for field in self.events}
         self._asleep: dict[int, None] = {}
         self._ids: Ints = np.zeros(0, dtype=np.int64)
         self._stale = True
@@ -68,6 +74,7 @@ class Wakes:
                 continue
             self._watched[field] += watching - int(self._watching[field][node])
             self._watching[field][node] = watching
+            self._at_rest[field][node] = False
             if watching and node in self._newest[field]:
                 self._seen[field][node] = event.signature(self._newest[field][node])
         self._asleep[node] = None
@@ -88,12 +95,24 @@ class Wakes:
         """Return the sleepers that wake on a change of the sensor `field`."""
         return np.flatnonzero(self._watching[field]) if self._watched[field] else _NO_NODES
 
-    def note_readings(self, field: str, nodes: Ints, readings: Sequence[Any], tick: int) -> None:
-        """Wake those of `nodes` whose reading differs from the one they observed last."""
-        signature, seen = self.events[field].signature, self._seen[field]
+    def at_rest(self, field: str, nodes: Ints) -> Bools:
+        """Return (k,) which of `nodes` had nothing to sense when their readings were compared last, since they sleep."""
+        return self._at_rest[field][nodes]
+
+    def note_readings(
+        self, field: str, nodes: Ints, readings: Sequence[Any], tick: int, is_steady: bool = False
+    ) -> None:
+        """Wake those of `nodes` whose reading differs from the one they observed last.
+
+        `is_steady` states that the readings stay the same while no body moves.
+        """
+        (_, signature, rest), seen, at_rest = self.events[field], self._seen[field], list[bool]()
         for node, reading in zip(nodes.tolist(), readings, strict=True):
-            if signature(reading) != seen.get(node):
+            now = signature(reading)
+            if now != seen.get(node):
                 self._due[node] = tick
+            at_rest.append(is_steady and now == rest)
+        self._at_rest[field][nodes] = at_rest
 
     def remember(self, field: str, nodes: Sequence[int], readings: Sequence[Any]) -> None:
         """Keep the readings that `nodes` observe now. While the same nodes are awake, they replace the ones before."""
