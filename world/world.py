@@ -262,7 +262,8 @@ class World:
         if not (self._wakes.watching and self.scene.moved.any()):
             return
         for field in self._wakes.events:
-            watchers = self._wakes.watchers(field)
+            if not len(watchers := self._wakes.watchers(field)):
+                continue
             reach_m = self._sensing.reach_at_rest_m(field, self.scene)
             if reach_m is not None:
                 watchers = watchers[~self._wakes.at_rest(field, watchers) | self.scene.moved_near(watchers, reach_m)]

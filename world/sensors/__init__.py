@@ -97,7 +97,7 @@ class Sensor(ABC):
 
     @classmethod
     def rest(cls) -> Any:
-        """Return the reading where there is nothing to sense, for the conformance kit."""
+        """Return the reading where there is nothing to sense, for the wake rule and the conformance kit."""
         return (0.0,)
 
     @classmethod

@@ -3,7 +3,8 @@
 A node that gave no wake is observed at every tick. A node with a wake sleeps until its time comes or one of its events
 happens. Events are a packet for it, and a sensor reading that differs from the last one it observed. A sensor states
 its event (`Sensor.wake_event`, `Sensor.signature`): touch, a change of the closed switches; bearings, of the ids in
-sight. Readings are compared after every tick at which any robot moved, entered or left.
+sight. Readings are compared after every tick at which any robot moved, entered or left; where a sensor states a reach, a
+sleeper with nothing to sense is left out until it moves, or a body in reach does.
 """
 
 import math
@@ -26,7 +27,7 @@ class WakeEvent(NamedTuple):
 
     asked_by: str
     signature: Callable[[Any], Hashable]
-    rest: Hashable = None
+    rest: Hashable
 
 
 class Wakes:
@@ -106,13 +107,12 @@ class Wakes:
 
         `is_steady` states that the readings stay the same while no body moves.
         """
-        (_, signature, rest), seen, at_rest = self.events[field], self._seen[field], list[bool]()
-        for node, reading in zip(nodes.tolist(), readings, strict=True):
-            now = signature(reading)
+        (_, signature, rest), seen = self.events[field], self._seen[field]
+        signatures = [signature(each) for each in readings]
+        for node, now in zip(nodes.tolist(), signatures, strict=True):
             if now != seen.get(node):
                 self._due[node] = tick
-            at_rest.append(is_steady and now == rest)
-        self._at_rest[field][nodes] = at_rest
+        self._at_rest[field][nodes] = [each == rest for each in signatures] if is_steady else False
 
     def remember(self, field: str, nodes: Sequence[int], readings: Sequence[Any]) -> None:
         """Keep the readings that `nodes` observe now. While the same nodes are awake, they replace the ones before."""
