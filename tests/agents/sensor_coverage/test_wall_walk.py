@@ -95,10 +95,8 @@ def test_a_wall_close_to_a_slot_may_end_past_the_last_touched_point_but_not_wher
     way = [NearPoint((0.13, 0.05 * each), (0.0,)) for each in range(7)]
     leaving = [NearPoint((0.05 * each, 0.3), ()) for each in (0, -3, -6)]
     again = [NearPoint((-0.13, 0.3 - 0.05 * each), (math.pi,)) for each in range(7)]
-    one, two = (
-        walls_around((0.0, 0.0), FollowedWay(way, -1, 0.07)),
-        walls_around((0.0, 0.0), FollowedWay([*way, *leaving, *again], -1, 0.07)),
-    )
+    one = walls_around((0.0, 0.0), FollowedWay(way, -1, 0.07))
+    two = walls_around((0.0, 0.0), FollowedWay([*way, *leaving, *again], -1, 0.07))
     last = united_round(Arc(*each) for each in one.followed)
     assert [(round(math.degrees(a)) - 360, round(math.degrees(a + width)) - 360) for a, width in last] == [(-5, 56)]
     assert [(round(math.degrees(a)), round(math.degrees(a + width))) for a, width in one.past_ends] == [(56, 58)]

@@ -142,9 +142,10 @@ class SlotProof:
         return complement([*self._by_view, *fans, *self._by_walks.counting(standing), *edged])
 
     def _relies_on_other(self, arc: ProvedArc) -> bool:
-        """Return whether the other slot of a triangle answers for the space beyond: it does not where it relies on this one.
+        """Return whether this slot may rely on the other slot of a triangle for the space beyond.
 
-        It does where it sees the point behind this robot in touch, or saw nothing of walks in the angle here.
+        It may not where the other slot relies on this one: where that one sees the point behind this robot in touch, or saw
+        nothing of a walk in the angle here.
         """
         triangle = arc.triangle
         if triangle is None:
@@ -366,12 +367,8 @@ class SlotProof:
     def inherit(self, memory: Iterable[ProvedArc], edges: Iterable[LostSight] = ()) -> None:
         """Take over the arcs that walks closed, and the edges of sight, from the slot's former occupant."""
         self._open = None
-        self._near, self._by_walks, self._triangles, self._unseen = (
-            [],
-            WalkArcs(),
-            ChosenTriangles(),
-            UnseenDirections(),
-        )
+        self._near, self._by_walks = [], WalkArcs()
+        self._unseen, self._triangles = UnseenDirections(), ChosenTriangles()
         self._stretches, self._touches, self._sights = {}, {}, {}
         self._edges = {SightEnd(*each): None for each in edges}
         for each in memory:

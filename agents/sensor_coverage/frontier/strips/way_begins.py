@@ -17,10 +17,8 @@ SAME_RAD: Final = 1e-3
 
 def begin_width(arc: Arc, hand: int, begins: Iterable[Arc]) -> float:
     """Return the width [rad] of the part of an arc beyond the point where a way with the wall at the `hand` begins, or 0."""
-    edge = arc.start_rad + (arc.width_rad if hand > 0 else 0.0)
     for each in begins if hand else ():
-        its_edge = each.start_rad + (each.width_rad if hand > 0 else 0.0)
-        if abs(math.remainder(its_edge - edge, math.tau)) < SAME_RAD:
+        if abs(math.remainder(_edge_of(each, hand) - _edge_of(arc, hand), math.tau)) < SAME_RAD:
             return each.width_rad
     return 0.0
 
@@ -45,5 +43,9 @@ def _shortened(arc: NearArc, near: Iterable[NearArc]) -> NearArc:
 
 def _begin_of(arc: NearArc) -> float:
     """Return the direction [rad] of the touched point where a way begins."""
-    (start, width), hand = arc.arc, arc.hand
-    return start + width - arc.begin_rad if hand > 0 else start + arc.begin_rad
+    return _edge_of(arc.arc, arc.hand) - arc.hand * arc.begin_rad
+
+
+def _edge_of(arc: Arc, hand: int) -> float:
+    """Return the direction [rad] of the edge of an arc at which a way with the wall at the `hand` begins."""
+    return arc.start_rad + arc.width_rad if hand > 0 else arc.start_rad

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import combinations, dropwhile, pairwise
+from itertools import chain, combinations, dropwhile, pairwise
 from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.directions import angle_between
@@ -147,9 +147,9 @@ def walls_around(start: Vector, way: FollowedWay) -> NearWalls:
         for number, is_clear in enumerate(stretch.is_clear)
         if is_clear and not _begins_way(stretch, number)
     )
-    return NearWalls(
-        *map(_positive, (_arcs_followed(start, way, stretches), past_ends, _begins(start, way, stretches)))
-    )
+    begins = _positive(_begins(start, way, stretches))
+    followed = _positive(_arcs_followed(start, way, stretches))
+    return NearWalls((*followed, *begins), _positive(past_ends), begins)
 
 
 def _stretches(way: FollowedWay) -> Iterator[_Stretch]:
@@ -196,7 +196,7 @@ def _begins(start: Vector, way: FollowedWay, stretches: Iterable[_Stretch]) -> I
 
 
 def _arcs_followed(start: Vector, way: FollowedWay, stretches: Sequence[_Stretch]) -> Iterator[tuple[float, float]]:
-    """Yield the arcs (start, width) [rad] around a start in which walls were followed; see `walls_around`."""
+    """Yield the arcs (start, width) [rad] around a start in which walls were followed, up to their ends; see `walls_around`."""
     points, hand, radius_m, swept_only = way
     places = [each.at for each in points]
     upto = [places[: number + 1] for number in range(len(places))]
@@ -214,7 +214,6 @@ def _arcs_followed(start: Vector, way: FollowedWay, stretches: Sequence[_Stretch
         part = slice(stretch.first, stretch.last + 1)
         seen = list(zip(points[part], in_sight[part], swept[part], strict=True))
         yield from _arcs_of_stretch(start, seen, stretch.ends, hand)
-    yield from _begins(start, way, stretches)
 
 
 def _positive(arcs: Iterable[tuple[float, float]]) -> NearArcs:
@@ -235,7 +234,8 @@ def arcs_around_all(places: Iterable[Vector], way: FollowedWay) -> NearArcs:
     stretches = list(_stretches(way))
     shared = [Arc(0.0, math.tau)]
     for place in places:
-        closed = united(Arc(*each) for each in _positive(_arcs_followed(place, way, stretches)))
+        found = chain(_arcs_followed(place, way, stretches), _begins(place, way, stretches))
+        closed = united(Arc(*each) for each in _positive(found))
         shared = [part for each in shared for other in closed for part in shared_arcs(each, other)]
     return tuple(shared)
 
