@@ -26,10 +26,6 @@ GAP_RAD: Final = math.radians(1.5)
 TOUCH_RAD: Final = math.radians(45.0)
 # The touched wall lies within this angle [rad] of the direction: half a switch.
 CONTACT_RAD: Final = math.radians(15.0)
-# Half of the directions that the body of a robot in touch fills, less an error of its bearing of 5 degrees.
-BODY_RAD: Final = math.radians(25.0)
-# Greatest angle between a wall and a robot in touch, between which no opening fits.
-BETWEEN_RAD: Final = math.radians(120.0)
 # A walking robot that touches a wall and a standing robot at once closes this angle [rad] between the two.
 POCKET_RAD: Final = math.radians(55.0)
 # Successive points without a contact at which a walking robot still follows the wall: it turns round a corner.
@@ -285,18 +281,6 @@ def point_before(slot: int, last: SeenPoint | None, now: SeenPoint, touch_since:
 def arcs_of_walls(directions: Iterable[float], half_rad: float = TOUCH_RAD) -> list[Arc]:
     """Return the arcs that walls in touch close, `half_rad` on both sides of their directions [rad]."""
     return [Arc(each - half_rad, 2.0 * half_rad) for each in directions]
-
-
-def arcs_of_robots(directions: Iterable[float], walls: Iterable[float]) -> Iterator[Arc]:
-    """Yield the arcs that standing robots in touch close; their directions and those of walls in touch are in [rad].
-
-    Behind its body a robot is responsible itself. A body is less than one diameter away from a wall that is in touch, too.
-    """
-    for each in directions:
-        yield Arc(each - BODY_RAD, 2.0 * BODY_RAD)
-        for wall in walls:
-            if abs(math.remainder(wall - each, math.tau)) <= BETWEEN_RAD:
-                yield arc_between(each, wall)
 
 
 def arcs_of_step(slot: int, before: WalkPoint | None, point: WalkPoint, hand: int) -> Iterator[Arc]:

@@ -11,6 +11,7 @@ from zwerm.agents.sensor_coverage.frontier.proofs.chosen_triangles import Chosen
 from zwerm.agents.sensor_coverage.frontier.proofs.slot_memory import remembered
 from zwerm.agents.sensor_coverage.frontier.proofs.unseen_directions import UnseenDirections
 from zwerm.agents.sensor_coverage.frontier.proofs.walk_arcs import WalkArcs
+from zwerm.agents.sensor_coverage.frontier.strips.bodies import BODY_RAD, arcs_of_robots
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStretch
 from zwerm.agents.sensor_coverage.frontier.strips.seen_stretch import SeenStep, SeenStretch, SeenTouch
 from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import (
@@ -22,14 +23,12 @@ from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import (
 )
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     BLIND_MAX,
-    BODY_RAD,
     CONTACT_RAD,
     NEWS_RAD,
     Arc,
     WalkPoint,
     WallStep,
     arc_between,
-    arcs_of_robots,
     arcs_of_step,
     arcs_of_walls,
     complement,

@@ -6,7 +6,6 @@ A walk ends where no standing robot sees it, and the deployment goes on from the
 the robots that saw it. When one of them is gone, nothing is known of its part: the points that it saw close nothing.
 """
 
-import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Final, NamedTuple
@@ -16,6 +15,7 @@ from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.frontier.proofs.passed_points import Passed, passes
 from zwerm.agents.sensor_coverage.frontier.proofs.point_triangles import PointTriangles
 from zwerm.agents.sensor_coverage.frontier.proofs.walk_origins import WalkOrigins
+from zwerm.agents.sensor_coverage.frontier.strips.bodies import arcs_of_robots, arcs_to_robot, is_behind
 from zwerm.agents.sensor_coverage.frontier.strips.crossings import (
     arcs_beside_pocket,
     crossings_of_pocket,
@@ -30,7 +30,6 @@ from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import (
 )
 from zwerm.agents.sensor_coverage.frontier.strips.way_begins import between_begins
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
-    BODY_RAD,
     CONTACT_RAD,
     Arc,
     Crossing,
@@ -39,7 +38,6 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     WalkPoint,
     arc_between,
     arcs_into,
-    arcs_of_robots,
     arcs_of_walls,
     complement,
     contains,
@@ -198,6 +196,9 @@ class SwarmProof:
     def _spoil(self, slot: int) -> None:
         """Forget what depends on the arcs of a slot."""
         self._reopen(slot)
+        for each in self._neighbours.get(slot, ()):
+            if slot in self._around[each].in_touch:
+                self._reopen(each)
         for pair in [pair for pair in self._chosen if slot in pair]:
             del self._chosen[pair]
             for each in pair:
@@ -240,7 +241,9 @@ class SwarmProof:
     def _closed_by_robots(self, slot: int) -> list[Arc]:
         """Return the arcs of a slot that triangles of robots and robots in touch close."""
         view, around = self._views[slot], self._around[slot]
-        bodies = arcs_of_robots([view[each] for each in around.in_touch], around.touched)
+        bodies = list(arcs_of_robots([view[each] for each in around.in_touch], around.touched))
+        for each in around.in_touch:
+            bodies += arcs_to_robot(view[each], around.touched, self._views[each][slot], self._edged.get(each, ()))
         return [*bodies, *self._arcs_between(slot)]
 
     def _arcs_between(self, slot: int, without: int | None = None) -> Iterator[Arc]:
@@ -356,7 +359,7 @@ class SwarmProof:
         for other in standing:
             view, there = self._views[other], point.seen[other]
             for slot in self._around[other].in_touch:
-                if slot in point.seen and abs(math.remainder(view[slot] - there, math.tau)) <= BODY_RAD:
+                if slot in point.seen and is_behind(view[slot], there):
                     yield slot, other
 
     def _is_proved(self, slot: int, there: float, other: int) -> bool:
