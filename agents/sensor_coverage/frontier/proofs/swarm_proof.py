@@ -196,9 +196,6 @@ class SwarmProof:
     def _spoil(self, slot: int) -> None:
         """Forget what depends on the arcs of a slot."""
         self._reopen(slot)
-        for each in self._neighbours.get(slot, ()):
-            if slot in self._around[each].in_touch:
-                self._reopen(each)
         for pair in [pair for pair in self._chosen if slot in pair]:
             del self._chosen[pair]
             for each in pair:
