@@ -23,8 +23,9 @@ TOUCHED_RAD: Final = math.radians(8.0)
 CLOSED_STEP_RAD: Final = math.radians(3.0)
 
 Views = Mapping[int, Mapping[int, float]]
-# The direction [rad] of a point from a slot, and the other slots that saw it, with theirs.
-_Lost = tuple[float, tuple[tuple[int, float], ...]]
+# The direction [rad] of a point from a slot, its stretch if it is on the slot's own way, and the other slots that saw it, with
+# their directions.
+_Lost = tuple[float, int | None, tuple[tuple[int, float], ...]]
 # The directions [rad] of an end of a stretch from a slot that ties it and from another one, and all slots that tie it.
 _Tied = tuple[float, float, tuple[int, ...]]
 _DIRECTION: Final = itemgetter(0)
@@ -34,11 +35,17 @@ class PointTriangles:
     """The triangles of all points, by the number of the point.
 
     `is_proved` states for a slot, a direction [rad] and another slot whether the first one stands, and the space in its
-    direction is proved without the other.
+    direction is proved without the other. `is_witness` states for a slot, a direction [rad], a pair and a stretch of wall
+    whether the slot answers for a point there that the first slot of the pair saw on its own way, without the pair.
     """
 
-    def __init__(self, is_proved: Callable[[int, float, int], bool]) -> None:
+    def __init__(
+        self,
+        is_proved: Callable[[int, float, int], bool],
+        is_witness: Callable[[int, float, Pair, int], bool],
+    ) -> None:
         self._is_proved = is_proved
+        self._is_witness = is_witness
         self._basis: dict[int, tuple[object, object, object]] = {}
         self._pairs: dict[int, tuple[Pair, ...]] = {}
         self._forget()
@@ -46,8 +53,8 @@ class PointTriangles:
     def _forget(self) -> None:
         self._stretch_of: dict[int, int] = {}  # the number of the first point of the stretch, by the number of a point
         self._since: dict[int, int] = {}  # the number of the first point of the first walk that a slot saw
-        # The points that a slot saw, each with its walk and its directions [rad].
-        self._seen: dict[int, list[tuple[int, WalkPoint, tuple[float, ...]]]] = {}
+        # The points that a slot saw, each with its walk, its directions [rad], and its number if it is on the slot's own way.
+        self._seen: dict[int, list[tuple[int, WalkPoint, tuple[float, ...], int | None]]] = {}
         # The points that a slot saw, and another one that stood then did not. They hold for the number of points that the slot
         # saw.
         self._lost: dict[tuple[int, int], tuple[int, list[_Lost]]] = {}
@@ -66,7 +73,7 @@ class PointTriangles:
         """Add a point of a walk that a slot saw; `stretch` and `walk` are the numbers of their first points."""
         self._stretch_of[number] = stretch
         self._since.setdefault(slot, walk)
-        self._seen.setdefault(slot, []).append((walk, point, (point.seen[slot],)))
+        self._seen.setdefault(slot, []).append((walk, point, (point.seen[slot],), None))
 
     def add_tied(self, slot: int, point: WalkPoint, ties: tuple[int, ...]) -> None:
         """Add an end of a stretch at a point that a slot saw, and the slots that tie it."""
@@ -83,7 +90,9 @@ class PointTriangles:
         Such a way may lead straight away from the slot. So these points count in directions close to their own, too.
         """
         aside = 2.0 * HIDDEN_MIN_RAD
-        self._seen.setdefault(slot, []).extend((walk, point, (there - aside, there + aside)) for there, point in points)
+        self._seen.setdefault(slot, []).extend(
+            (walk, point, (there - aside, there + aside), number) for number, (there, point) in enumerate(points, walk)
+        )
 
     def stretch_of(self, number: int) -> int:
         """Return the number of the first point of a point's stretch, or -1."""
@@ -154,7 +163,11 @@ class PointTriangles:
         bare = self._bare.setdefault(pair, {})
         for each in chain(within, beyond):
             if each not in bare:
-                bare[each] = not any(self._is_proved(*one, other) for one in lost[each][1])
+                _, stretch, saw = lost[each]
+                bare[each] = not any(
+                    self._is_proved(*one, other) if stretch is None else self._is_witness(*one, pair, stretch)
+                    for one in saw
+                )
             if bare[each]:
                 return True
         return False
@@ -190,8 +203,12 @@ class PointTriangles:
         count, known = self._lost.setdefault((slot, other), (0, []))
         if count != len(points):
             known += (
-                (there % math.tau, tuple(one for one in each.seen.items() if one[0] != slot))
-                for walk, each, directions in points[count:]
+                (
+                    there % math.tau,
+                    None if number is None else self.stretch_of(number),
+                    tuple(one for one in each.seen.items() if one[0] != slot),
+                )
+                for walk, each, directions, number in points[count:]
                 if other not in each.seen and self._since.get(other, math.inf) <= walk
                 for there in directions
             )

@@ -11,8 +11,8 @@ from zwerm.agents.sensor_coverage.frontier.proofs.chosen_triangles import Chosen
 from zwerm.agents.sensor_coverage.frontier.proofs.slot_memory import remembered
 from zwerm.agents.sensor_coverage.frontier.proofs.unseen_directions import UnseenDirections
 from zwerm.agents.sensor_coverage.frontier.proofs.walk_arcs import WalkArcs
-from zwerm.agents.sensor_coverage.frontier.strips.bodies import BODY_RAD, arcs_of_robots
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStretch
+from zwerm.agents.sensor_coverage.frontier.strips.robots_in_touch import BODY_RAD, arcs_of_robot
 from zwerm.agents.sensor_coverage.frontier.strips.seen_stretch import SeenStep, SeenStretch, SeenTouch
 from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import (
     SightEnd,
@@ -109,8 +109,7 @@ class SlotProof:
         self._touched = touched = tuple(touched)
         self._at_walls, self._contacts = arcs_of_walls(touched), arcs_of_walls(touched, CONTACT_RAD)
         self._in_touch = [each for each in self.around if each in in_touch]
-        bodies = [self.around[each] for each in self._in_touch]
-        self._by_view = list(arcs_of_robots(bodies, touched))
+        self._by_view = [arc for each in self._in_touch for arc in arcs_of_robot(self.around[each], touched)]
         for triangle in scan.complex_.triangles_at(slot):
             a, b = (each for each in triangle if each != slot)
             self._by_view.append(arc_between(view[a], view[b]))

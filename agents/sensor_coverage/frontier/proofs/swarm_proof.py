@@ -8,36 +8,23 @@ the robots that saw it. When one of them is gone, nothing is known of its part: 
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from types import MappingProxyType
-from typing import Final, NamedTuple
+from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.fans import Pair, side_of
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.frontier.proofs.passed_points import Passed, passes
 from zwerm.agents.sensor_coverage.frontier.proofs.point_triangles import PointTriangles
+from zwerm.agents.sensor_coverage.frontier.proofs.reliance import Fan, circular_gaps
 from zwerm.agents.sensor_coverage.frontier.proofs.walk_origins import WalkOrigins
-from zwerm.agents.sensor_coverage.frontier.strips.bodies import arcs_of_robots, arcs_to_robot, is_behind
-from zwerm.agents.sensor_coverage.frontier.strips.crossings import (
-    arcs_beside_pocket,
-    crossings_of_pocket,
-    crossings_of_step,
-)
-from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import Pocket
-from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import (
-    SightEnd,
-    edged_arcs,
-    shortened,
-    with_islands,
-)
-from zwerm.agents.sensor_coverage.frontier.strips.way_begins import between_begins
+from zwerm.agents.sensor_coverage.frontier.proofs.wall_arcs import ArcBasis, StepCrossings, WallArcs, find_wall_arcs
+from zwerm.agents.sensor_coverage.frontier.strips.robots_in_touch import arcs_of_robot
+from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import with_islands
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
-    CONTACT_RAD,
     Arc,
-    Crossing,
     NearArc,
     Walk,
     WalkPoint,
     arc_between,
-    arcs_into,
     arcs_of_walls,
     complement,
     contains,
@@ -51,17 +38,6 @@ from zwerm.maths.sums import added
 EQUAL_RAD: Final = 1e-6
 
 
-class ArcBasis(NamedTuple):
-    """What was known around a slot when its arcs were found."""
-
-    passed: int
-    view: Mapping[int, float]
-    touched: Sequence[float]
-    near: Sequence[NearArc]
-    in_touch: Sequence[int]
-    robot: int | None
-
-
 class SwarmProof:
     """The closed arcs of all slots of one scan."""
 
@@ -71,11 +47,12 @@ class SwarmProof:
         self._points: list[WalkPoint] = []
         self._origins = WalkOrigins()
         self._passed: dict[int, list[Passed]] = {}
+        self._crossings: dict[int, StepCrossings] = {}
         self._witnessed: dict[int, dict[int, None]] = {}  # slots that rely on points which this slot saw
         self._gone: dict[int, None] = {}  # slots that stood in an earlier scan
         self._views: dict[int, Mapping[int, float]] = {}  # the directions [rad] of the neighbours, by slot
         self._versions: dict[int, int] = {}  # changes of what a slot sees
-        self._triangles = PointTriangles(self._is_proved)
+        self._triangles = PointTriangles(self._is_proved, self._is_witness)
         self._touched_by: Mapping[tuple[int, int], Sequence[float]] = {}
         self._forget()
 
@@ -84,12 +61,11 @@ class SwarmProof:
         self._robots: dict[int, int] = {}  # at slots at which walks have begun
         self._neighbours: dict[int, frozenset[int]] = {}
         self._around: dict[int, ArcBasis] = {}
-        self._followed: dict[int, list[Arc]] = {}  # arcs that end at followed walls or at contacts, by slot
-        self._by_stretch: dict[int, dict[int, list[Arc]]] = {}  # of them those of one stretch, by slot and stretch
-        self._edged: dict[int, list[Arc]] = {}  # the same arcs as `_followed` without edges of sight
+        self._wall_arcs: dict[int, WallArcs] = {}
         self._chosen: dict[Pair, dict[int, int]] = {}  # the numbers of the points of triangles beside an edge, by side
         self._open_arcs: dict[int, list[Arc]] = {}
         self._alone: dict[Pair, list[Arc]] = {}  # what is closed at the first slot without the second
+        self._by_robots: dict[tuple[int, ...], list[Arc]] = {}  # what robots close at the first slot without these
         self._settled: dict[int, None] = {}  # open slots that no other choice of points closes better
 
     def update(
@@ -141,7 +117,21 @@ class SwarmProof:
     def open_arcs(self) -> dict[int, list[Arc]]:
         """Return the arcs in which each slot is open, without the slots that are open in none."""
         self._choose_again()
-        return {slot: arcs for slot in self._around if (arcs := self._open(slot))}
+        return {slot: arcs for slot in self._around if (arcs := self._open(slot))} or self._circular()
+
+    def _circular(self) -> dict[int, list[Arc]]:
+        """Return the gaps that slots close by relying on each other in a circle."""
+        gaps = {slot: complement(self._closed_without_fans(slot)) for slot in self._around}
+        return circular_gaps(gaps, {slot: list(self._fans(slot)) for slot, each in gaps.items() if each})
+
+    def _fans(self, slot: int) -> Iterator[Fan]:
+        """Yield the triangles with points that count at a slot."""
+        for other in self._neighbours[slot]:
+            for number in self._choose(_pair_of(slot, other)).values():
+                if (slot, other) in self._triangles.pairs(number):
+                    point = self._points[number]
+                    _, *more = self._origins.arcs_of_triangle((slot, other), number, point, self._views)
+                    yield Fan(other, self._views[slot][other], point.seen[slot], point.seen[other], more)
 
     # --- what has changed -------------------------------------------------------------------------------------------
 
@@ -152,6 +142,7 @@ class SwarmProof:
             same = {number for number, (a, b) in enumerate(zip(self._points, points, strict=False)) if a is b}
             self._walks, self._count = walks, 0
             self._points, self._passed, self._witnessed, self._origins = [], {}, {}, WalkOrigins()
+            self._crossings = {}
             self._triangles.begin_again(same)
             self._forget()
         for walk in walks[self._count :]:
@@ -178,12 +169,12 @@ class SwarmProof:
             points |= dict.fromkeys(each.number for each in self._passed.get(slot, ()))
             stale |= self._witnessed.get(slot, {})
             self._spoil(slot)
-            for known in (self._around, self._followed, self._by_stretch, self._edged):
+            for known in (self._around, self._wall_arcs):
                 known.pop(slot, None)
         for slot in stale:
             if slot in self._around:
                 points |= dict.fromkeys(each.number for each in self._passed.get(slot, ()))
-                self._followed[slot] = self._arcs_to_walls(slot)
+                self._wall_arcs[slot] = self._find_walls(slot)
                 self._spoil(slot)
         self._alone.clear()
         self._triangles.forget_proved()
@@ -227,26 +218,40 @@ class SwarmProof:
                 if (slot, other) in self._triangles.pairs(each):
                     fans += self._origins.arcs_of_triangle((slot, other), each, self._points[each], self._views)
         touched, beside = arcs_of_walls(self._around[slot].touched), self._closed_by_robots(slot)
-        opened = complement([*self._followed[slot], *touched, *beside, *fans])
+        opened = complement([*self._wall_arcs[slot].followed, *touched, *beside, *fans])
         contacts = touched if slot in self._bases else ()  # a station cannot look behind what it touches
-        return with_islands(opened, [*self._edged[slot], *contacts, *beside, *fans])
+        return with_islands(opened, [*self._wall_arcs[slot].edged, *contacts, *beside, *fans])
 
     def _closed_without_fans(self, slot: int) -> list[Arc]:
         """Return the arcs of a slot that walls and triangles of robots close."""
-        return [*self._followed[slot], *arcs_of_walls(self._around[slot].touched), *self._closed_by_robots(slot)]
+        return [
+            *self._wall_arcs[slot].followed,
+            *arcs_of_walls(self._around[slot].touched),
+            *self._closed_by_robots(slot),
+        ]
 
     def _closed_by_robots(self, slot: int) -> list[Arc]:
         """Return the arcs of a slot that triangles of robots and robots in touch close."""
-        view, around = self._views[slot], self._around[slot]
-        bodies = list(arcs_of_robots([view[each] for each in around.in_touch], around.touched))
-        for each in around.in_touch:
-            bodies += arcs_to_robot(view[each], around.touched, self._views[each][slot], self._edged.get(each, ()))
+        bodies = (arc for each in self._around[slot].in_touch for arc in self._arcs_of_body(slot, each))
         return [*bodies, *self._arcs_between(slot)]
 
-    def _arcs_between(self, slot: int, without: int | None = None) -> Iterator[Arc]:
-        """Yield the arcs of a slot in its triangles of robots, but those with one of its neighbours."""
-        view, beside = self._views[slot], self._neighbours[slot] - {without}
-        yield from (arc_between(view[a], view[b]) for a in beside for b in beside & self._neighbours[a] if a < b)
+    def _arcs_of_body(self, slot: int, other: int) -> Iterator[Arc]:
+        """Return the arcs in which a slot relies on another one whose robot is in touch with its own."""
+        touched = self._around[slot].touched
+        followed = self._wall_arcs[other].edged if other in self._wall_arcs else ()
+        return arcs_of_robot(self._views[slot][other], touched, self._views[other][slot], followed)
+
+    def _arcs_between(self, slot: int, without: Collection[int] = (), before: Collection[int] = ()) -> Iterator[Arc]:
+        """Yield the arcs of a slot in its triangles of robots, but those with other slots, and those `before` other slots.
+
+        A triangle is before a slot that shares edges with the two others.
+        """
+        view, around = self._views[slot], self._neighbours
+        beside = around[slot].difference(without)
+        for a in beside:
+            for b in beside & around[a]:
+                if a < b and not any(a in around[each] and b in around[each] for each in before if each in around):
+                    yield arc_between(view[a], view[b])
 
     def _choose(self, pair: Pair) -> dict[int, int]:
         """Return the number of the point of the triangle on each side of an edge: the one that closes most at both ends.
@@ -305,35 +310,19 @@ class SwarmProof:
                             self._reopen(each)
                         waiting += [slot, *sorted(self._neighbours[slot] | self._neighbours[other])]
 
-    def _arcs_to_walls(self, slot: int) -> list[Arc]:
-        """Return the arcs at a slot that end at followed walls or at contacts. They are disjoint."""
-        around, contacts = self._around[slot], arcs_of_walls(self._around[slot].touched, CONTACT_RAD)
-        crossings: dict[int, list[Crossing]] = {}
-        beside: dict[tuple[int, bool], tuple[int, Pocket]] = {}  # by stretch and end, with the hand
-        edges: dict[int, list[SightEnd]] = {}
-        dark: list[SightEnd] = []
-        for _, before, point, hand, between, stretch, ends, pockets, sight_ends, dark_ends, _ in self._passed.get(
-            slot, ()
-        ):
-            if not self._counts(point) or (before is not None and not self._counts(before)):
-                continue
-            if all(any(each in self._neighbours for each in witnesses) for witnesses in between):
-                loose = [each for each in ends if not each.is_tied(self._neighbours)]
-                crossings.setdefault(stretch, []).extend(crossings_of_step(slot, before, point, hand, loose))
-            edges.setdefault(stretch, []).extend(each for each in sight_ends if each.is_loose(self._neighbours))
-            dark += (each for each in dark_ends if each.is_loose(self._neighbours))
-            for first_number, pocket in pockets:
-                contacts += arcs_beside_pocket(hand, pocket, self._touched_by.get((slot, pocket.robot), ()))
-                if pocket.in_touch or (first_number, pocket.is_last) not in beside:
-                    beside[first_number, pocket.is_last] = hand, pocket
-        for (first_number, _), (hand, pocket) in beside.items():
-            is_loose = not pocket.other.is_tied(self._neighbours)
-            crossings.setdefault(first_number, []).extend(crossings_of_pocket(hand, pocket, is_loose))
-        near = between_begins(around.near)
-        by_stretch = self._by_stretch[slot] = {number: arcs_into(each) for number, each in crossings.items()}
-        self._edged[slot] = edged_arcs(by_stretch, edges, contacts, shortened(near), dark)
-        found = (*contacts, *(each.arc for each in near), *(arc for each in by_stretch.values() for arc in each))
-        return united(found)
+    def _find_walls(self, slot: int) -> WallArcs:
+        """Return the arcs of a slot that end at followed walls or at contacts."""
+        passed = [
+            each
+            for each in self._passed.get(slot, ())
+            if self._counts(each.point) and (each.before is None or self._counts(each.before))
+        ]
+
+        def touched_by(robot: int) -> Sequence[float]:
+            return self._touched_by.get((slot, robot), ())
+
+        crossings = self._crossings.setdefault(slot, StepCrossings(slot))
+        return find_wall_arcs(passed, self._around[slot], self._neighbours, touched_by, crossings)
 
     def _counts(self, point: WalkPoint) -> bool:
         """Return whether all slots that saw a point of a walk still stand."""
@@ -352,11 +341,11 @@ class SwarmProof:
         return self._triangles.find(number, point, views, self._neighbours, self._versions, at_walls, without)
 
     def _behind_bodies(self, point: WalkPoint, standing: Iterable[int]) -> Iterator[Pair]:
-        """Yield (slot, other) if the other slot sees a point behind the slot's robot in touch: there it relies on the slot."""
+        """Yield (slot, other) if the other slot sees a point where it relies on the slot's robot in touch."""
         for other in standing:
-            view, there = self._views[other], point.seen[other]
+            there = Arc(point.seen[other], 0.0)
             for slot in self._around[other].in_touch:
-                if slot in point.seen and is_behind(view[slot], there):
+                if slot in point.seen and contains(self._arcs_of_body(other, slot), there):
                     yield slot, other
 
     def _is_proved(self, slot: int, there: float, other: int) -> bool:
@@ -368,9 +357,23 @@ class SwarmProof:
             return False
         known = self._alone.get((slot, other))
         if known is None:
-            walls = *self._edged.get(slot, ()), *arcs_of_walls(self._around[slot].touched)
-            known = self._alone[slot, other] = united([*walls, *self._arcs_between(slot, other)])
+            edged = self._wall_arcs[slot].edged if slot in self._wall_arcs else ()
+            closed = *edged, *arcs_of_walls(self._around[slot].touched), *self._arcs_between(slot, (other,))
+            known = self._alone[slot, other] = united(closed)
         return contains(known, Arc(there, 0.0))
+
+    def _is_witness(self, slot: int, there: float, pair: Pair, stretch: int) -> bool:
+        """Return whether a slot stands that saw a point of one slot's own way, and answers for it without both slots of a pair.
+
+        The slot sees the point in the direction `there` [rad], maybe through a gap far from it. So only walls close to the
+        slot and the `stretch` of wall on which the point lies close the direction: another one is before the point only as
+        seen by a robot that stood at another place. A triangle of robots does so if neither slot is beyond it.
+        """
+        if slot not in self._neighbours:
+            return False
+        near = (each.arc for each in self._around[slot].near)
+        walls, robots = self._wall_arcs[slot], self._arcs_between(slot, pair, pair)
+        return contains(robots, Arc(there, 0.0)) or walls.lies_at(there, stretch, near)
 
     def _ends_beyond(self, slot: int, number: int, side: int) -> bool:
         """Return whether the wall that was followed at a point lies beyond the line of sight to it, on one side.
@@ -380,10 +383,14 @@ class SwarmProof:
         """
         point = self._points[number]
         if slot in point.robots:
-            return ends_at(self._followed[slot], point.seen[slot], side)
-        if any(ends_at(self._followed[slot], each, side) for each in self._origins.touched(slot, number, side)):
+            return ends_at(self._wall_arcs[slot].followed, point.seen[slot], side)
+        if any(
+            ends_at(self._wall_arcs[slot].followed, each, side) for each in self._origins.touched(slot, number, side)
+        ):
             return True
-        return ends_at(self._by_stretch[slot].get(self._triangles.stretch_of(number), ()), point.seen[slot], side)
+        return ends_at(
+            self._wall_arcs[slot].by_stretch.get(self._triangles.stretch_of(number), ()), point.seen[slot], side
+        )
 
 
 def _pair_of(slot: int, other: int) -> Pair:

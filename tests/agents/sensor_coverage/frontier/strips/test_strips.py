@@ -126,7 +126,7 @@ def test_a_robot_that_is_touched_twice_at_an_end_looks_past_it_once() -> None:
         WalkPoint({0: deg(45.0)}, west, (), at=(0.12, 0.12)),
         WalkPoint({0: deg(55.0)}, west, (), at=(0.12, 0.17)),
     )
-    stretches = proof_of(Walk(0, 1, points, RADIUS_M), (0,))._by_stretch[0].values()
+    stretches = proof_of(Walk(0, 1, points, RADIUS_M), (0,))._wall_arcs[0].by_stretch.values()
     into = [arc for arcs in stretches for arc in arcs]
     assert not any((deg(25.0) - start) % math.tau < width for start, width in into)
     assert all((deg(first) - start) % math.tau >= width for start, width in into for first in (32.0, 50.0)), "and out"
@@ -255,7 +255,9 @@ def test_noise_of_the_first_bearing_beside_a_robot_closes_nothing_past_the_way()
         WalkPoint({0: math.radians(46.0)}, wall, (), at=(2.794, -0.344)),
         WalkPoint({0: math.radians(47.0)}, wall, (), at=(2.822, -0.338)),
     )
-    arcs = [arc for each in proof_of(Walk(0, -1, points, RADIUS_M), (0,))._by_stretch[0].values() for arc in each]
+    arcs = [
+        arc for each in proof_of(Walk(0, -1, points, RADIUS_M), (0,))._wall_arcs[0].by_stretch.values() for arc in each
+    ]
     closed = {each for each in range(25, 75) if any((math.radians(each) - a) % math.tau < width for a, width in arcs)}
     assert closed, "the wall beside the way"
     assert not closed & set(range(48, 75)), "between the bearings and the odometry of the first point"

@@ -7,7 +7,7 @@ import pytest
 
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.frontier.proofs.swarm_proof import SwarmProof
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, Walk, WalkPoint
 from zwerm.maths.simplicial import FlagComplex
 
 # Slot 1 is at the right of slot 0, in touch with it.
@@ -51,3 +51,20 @@ def test_the_mouth_is_open_again_when_the_other_robot_knows_its_walls_no_more() 
     for near_deg, expected_deg in (([], APART_DEG), ([(150, 28)], 360 - 25 - 195), ([], APART_DEG)):
         update(proof, 150, *near_deg)
         assert open_deg(proof) == expected_deg
+
+
+@pytest.mark.parametrize(
+    ("wall_deg", "counts"),
+    [
+        pytest.param(-150, False, id="slot 1 sees the point between the robot in touch and a wall"),
+        pytest.param(150, True, id="the wall in touch is on the other side"),
+    ],
+)
+def test_a_slot_does_not_rely_on_one_that_relies_on_its_body_beside_a_wall(wall_deg: int, counts: bool) -> None:
+    """As drawn building 826 showed: slot 1 touches a wall on one side, and on the other one a walk leads past it."""
+    degrees = ({0: -70, 1: -160}, {0: -45, 1: -135}, {0: -30, 1: -110})
+    points = [WalkPoint({slot: math.radians(d) for slot, d in each.items()}, (-math.pi / 2.0,), ()) for each in degrees]
+    proof = SwarmProof()
+    proof.update(SCAN, (Walk(0, -1, tuple(points)),), {1: [math.radians(wall_deg + 20)]}, {}, {1: (0,)})
+    triangles = {pair for number in range(len(points)) for pair in proof._triangles.pairs(number)}
+    assert ((0, 1) in triangles) is counts

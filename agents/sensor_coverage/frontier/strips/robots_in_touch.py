@@ -16,36 +16,23 @@ BODY_RAD: Final = math.radians(25.0)
 BETWEEN_RAD: Final = math.radians(120.0)
 
 
-def arcs_of_robots(directions: Iterable[float], walls: Iterable[float]) -> Iterator[Arc]:
-    """Yield the arcs that standing robots in touch close; their directions and those of walls in touch are in [rad]."""
-    for each in directions:
-        yield Arc(each - BODY_RAD, 2.0 * BODY_RAD)
-        for wall in walls:
-            if abs(math.remainder(wall - each, math.tau)) <= BETWEEN_RAD:
-                yield arc_between(each, wall)
-
-
-def is_behind(body_rad: float, point_rad: float) -> bool:
-    """Return whether the body of a robot in touch, in the first direction [rad], hides a point in the second one."""
-    return abs(math.remainder(body_rad - point_rad, math.tau)) <= BODY_RAD
-
-
-def arcs_to_robot(there_rad: float, walls: Iterable[float], back_rad: float, followed: Iterable[Arc]) -> Iterator[Arc]:
-    """Yield the arcs of a slot between a robot in touch and walls in touch at which that robot knows how the wall goes on.
+def arcs_of_robot(
+    there_rad: float, walls: Iterable[float], back_rad: float = 0.0, followed: Iterable[Arc] = ()
+) -> Iterator[Arc]:
+    """Yield the arcs in which a slot relies on a standing robot in touch: behind its body, and between it and walls in touch.
 
     The slot sees the robot in the direction `there_rad`, and the walls in the directions `walls` [rad]. The robot sees this
-    slot's robot in the direction `back_rad`. `followed` has its own arcs at followed walls: they contain the contact, wherever
-    it is within the error of its direction. The space beyond the line to the contact is then the part of that robot.
+    slot's robot in the direction `back_rad`. `followed` has its own arcs at followed walls. A wall at the other side counts if
+    they contain the contact, wherever it is within the error of its direction.
     """
+    yield Arc(there_rad - BODY_RAD, 2.0 * BODY_RAD)
     known = united(followed)
     for wall in walls:
         off = math.remainder(wall - there_rad, math.tau)
-        if abs(off) <= BETWEEN_RAD:
-            continue  # nothing has to be known
         # From the other robot's centre, two radii away, to the contact, one radius away.
         first, last = (_seen_contact(abs(off) + error) for error in (CONTACT_RAD, -CONTACT_RAD))
         start = back_rad - last if off >= 0.0 else back_rad + first
-        if contains(known, Arc(start, last - first)):
+        if abs(off) <= BETWEEN_RAD or contains(known, Arc(start, last - first)):
             yield arc_between(there_rad, wall)
 
 

@@ -71,7 +71,7 @@ def searched(point: WalkPoint, points: list[WalkPoint], views: Views, neighbours
 
 def added(points: list[WalkPoint]) -> PointTriangles:
     """Return the triangles of the points of one stretch. The space around each slot is proved without any other one."""
-    found = PointTriangles(lambda slot, there, other: True)
+    found = PointTriangles(lambda *asked: True, lambda *asked: True)
     for number, point in enumerate(points):
         for slot in point.seen:
             found.add(slot, number, 0, 0, point)
@@ -167,7 +167,7 @@ def test_a_point_behind_a_triangle(walk: int, seen_by_third: bool, third_knows: 
     views: Views = {0: {1: 0.0}, 1: {0: math.pi}}
     point = WalkPoint({0: math.radians(60.0), 1: math.radians(120.0)}, (math.pi / 2.0,), ())
     behind = WalkPoint({0: math.radians(40.0)} | ({2: 0.5} if seen_by_third else {}), (math.pi / 2.0,), ())
-    triangles = PointTriangles(lambda slot, there, other: third_knows and (slot, there, other) == (2, 0.5, 1))
+    triangles = PointTriangles(lambda *asked: third_knows and asked == (2, 0.5, 1), lambda *asked: False)
     triangles.add(0, 0, 0, 1, point)
     triangles.add(1, 0, 0, 1, point)
     at_walls = {(slot, side): True for slot in views for side in (1, -1)}
@@ -183,7 +183,7 @@ def test_a_third_slot_is_asked_again_once_its_proof_has_changed() -> None:
     point = WalkPoint({0: math.radians(60.0), 1: math.radians(120.0)}, (math.pi / 2.0,), ())
     behind = WalkPoint({0: math.radians(40.0), 2: 0.5}, (math.pi / 2.0,), ())
     proved: set[int] = set()
-    triangles = PointTriangles(lambda slot, there, other: slot in proved)
+    triangles = PointTriangles(lambda slot, *_: slot in proved, lambda *asked: False)
     for number, each in enumerate((point, behind)):
         for slot in each.seen:
             triangles.add(slot, number, 0, 0, each)
@@ -306,7 +306,7 @@ def pairs_of(
     point: WalkPoint, views: Views, end: WalkPoint | None = None, ties: tuple[int, ...] = ()
 ) -> tuple[Pair, ...]:
     """Return the triangles with a point beyond which all is proved. The slots `ties` tie an end of a stretch."""
-    triangles = PointTriangles(lambda slot, there, other: False)
+    triangles = PointTriangles(lambda *asked: False, lambda *asked: False)
     for slot in point.seen:
         triangles.add(slot, 0, 0, 0, point)
     for slot in () if end is None else end.seen:

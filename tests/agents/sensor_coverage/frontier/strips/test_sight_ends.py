@@ -73,6 +73,37 @@ def test_no_slot_answers_for_the_space_behind_an_edge_of_sight_that_nobody_saw(b
     assert proof._is_proved(0, math.radians(220.0), 1)
 
 
+def test_a_slot_answers_for_a_point_by_the_stretch_of_wall_on_which_it_lies_or_by_walls_close_to_it() -> None:
+    proof = SwarmProof()
+    walks = [Walk(0, -1, each) for each in (BEFORE, BEYOND)]
+    proof.update(SCAN, walks, {}, {0: [NearArc(arc(20, 80), 1)]}, {})
+    first, second = 0, len(BEFORE)
+    for there, stretch, answers in ((220, first, True), (220, second, False), (50, first, True), (50, second, True)):
+        assert proof._is_witness(0, math.radians(there), (1, 2), stretch) is answers
+    assert not proof._is_witness(2, math.radians(220.0), (0, 1), first), "the slot is empty"
+
+
+@pytest.mark.parametrize(
+    ("neighbours", "answers"),
+    [
+        pytest.param({0: {1, 2}, 1: {2}}, True, id="in the triangle with slots 1 and 2"),
+        pytest.param({0: {1, 2}, 1: {2, 3}, 2: {3}}, False, id="slot 3 is beyond that triangle"),
+        pytest.param({0: {1, 2}, 1: {2, 3}}, True, id="slot 3 is beside it"),
+    ],
+)
+def test_a_triangle_of_robots_answers_for_a_point_if_no_slot_that_asks_is_beyond_it(
+    neighbours: dict[int, set[int]], answers: bool
+) -> None:
+    at = {0: (0.0, 0.0), 1: (1.0, -0.5), 2: (1.0, 0.5), 3: (2.0, 0.0), 4: (3.0, 0.0)}
+    pairs = [(a, b) for a, others in neighbours.items() for b in others]
+    views: dict[int, dict[int, float]] = {slot: {} for slot in at}
+    for a, b in [*pairs, *((b, a) for a, b in pairs)]:
+        views[a][b] = math.atan2(at[b][1] - at[a][1], at[b][0] - at[a][0])
+    proof = SwarmProof()
+    proof.update(ScanResult(views, FlagComplex({slot: set(seen) for slot, seen in views.items()}), ()), (), {}, {}, {})
+    assert proof._is_witness(0, 0.0, (3, 4), 0) is answers
+
+
 def test_an_edge_of_sight_beside_an_open_arc_opens_nothing() -> None:
     assert open_at_0((*BEFORE, point())) == [(250, 150)]
 
