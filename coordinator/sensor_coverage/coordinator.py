@@ -293,7 +293,7 @@ class SensorCoverageCoordinator:
     def _update_fence(self, scan: ScanResult) -> None:
         """Find the fence of the complex without robots that have left it; pushes may begin at those."""
         self.scan = self.pushing.scan = scan
-        self.walking.idle = {slot: None for slot in self.walking.idle if slot in self.slots.occupant}
+        self.walking.keep_idle(scan)
         if self.walking.idle:
             self.scan = scan = scan._replace(complex_=scan.complex_.without(self.walking.idle))
         if self._redundancy == "link":

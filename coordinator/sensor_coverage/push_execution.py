@@ -319,15 +319,16 @@ class PushExecution:
     def recalls(self, silent: Collection[int]) -> list[Routine[Moved]]:
         """Return the return of one robot that is cut off from all stations: where walls are followed, its way is known.
 
-        `silent` are the robots that do not answer: to see them is not enough.
+        `silent` are the robots that do not answer: to see them is not enough, nor to see one that waits for a station.
         """
+        no_help = *silent, *self._sources.waiting.values()
         stations, occupant = self._sources.alive(), self._slots.occupant
         if self._parameters.walls == "paper" or not stations:
             return []
         for piece in self.scan.complex_.components():
             slots = [slot for slot in piece if self._recalled[occupant[slot]] < RECALLS_MAX]
             if slots and not any(slot in stations for slot in piece):
-                return [self._recall(max(slots), [*(occupant[slot] for slot in piece), *silent])]
+                return [self._recall(max(slots), [*(occupant[slot] for slot in piece), *no_help])]
         return []
 
     def _recall(self, slot: int, apart: Collection[int]) -> Routine[Moved]:

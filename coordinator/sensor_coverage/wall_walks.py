@@ -6,7 +6,7 @@ continues from that slot.
 """
 
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from typing import Final, NamedTuple
 
 import msgspec
@@ -16,7 +16,7 @@ from zwerm.agents.sensor_coverage.frontier.directions import angle_between, wrap
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.wall_plans import WallPlans
-from zwerm.agents.sensor_coverage.frontier.wall_proof import ANYONE, SAME_WALL_RAD, Origin, WalkPoint
+from zwerm.agents.sensor_coverage.frontier.wall_proof import ANYONE, SAME_WALL_RAD, Origin
 from zwerm.agents.sensor_coverage.messages.commands import (
     LOST,
     MET,
@@ -39,6 +39,7 @@ from zwerm.agents.sensor_coverage.motion.push_geometry import FIRST_BEARINGS_RAD
 from zwerm.agents.sensor_coverage.motion.triangulation import distances_m
 from zwerm.agents.sensor_coverage.motion.walls.wall_walk import CLEAR_M, FIRST_HOP_M, IDLE_LEGS_MAX, LEG_M
 from zwerm.coordinator.sensor_coverage.command_mailbox import CommandMailbox, Routine, run_concurrently
+from zwerm.coordinator.sensor_coverage.idle_slots import beside_others, still_idle, without_witnesses
 from zwerm.coordinator.sensor_coverage.push_execution import Moved, PushExecution
 from zwerm.coordinator.sensor_coverage.sources import Sources
 from zwerm.maths.sums import added
@@ -291,6 +292,11 @@ class WallWalks:
         self._measure(leader, origin, there, way)
         self.idle[slots.slot_of()[leader]] = None
 
+    def keep_idle(self, scan: ScanResult) -> None:
+        """Forget idle slots that are empty, and those without which a station sees no others. `scan` has all robots."""
+        occupied = {slot: None for slot in self.idle if slot in self._slots.occupant}
+        self.idle = beside_others(occupied, [scan.complex_.neighbours[base] for base in scan.bases])
+
     def wake(self, scan: ScanResult) -> bool:
         """Let idle slots count again where they are needed; return whether there were any. `scan` has all robots.
 
@@ -331,22 +337,6 @@ class WallWalks:
         answers = yield from self._mailbox.answers([robot], Walked)
         answer = answers.get(robot)
         return answer if isinstance(answer, Walked) else None
-
-
-def still_idle(idle: Mapping[int, None], neighbours: Mapping[int, Collection[int]]) -> dict[int, None]:
-    """Return the idle slots without those that no other slot sees, and without the idle slots in sight of these.
-
-    A robot that no other one sees stands where the proof has seen nothing.
-    """
-    apart = [slot for slot in idle if all(each in idle for each in neighbours.get(slot, ()))]
-    needed = {*apart, *(each for slot in apart for each in neighbours.get(slot, ()))}
-    return {slot: None for slot in idle if slot not in needed}
-
-
-def without_witnesses(idle: Mapping[int, None], points: Iterable[WalkPoint]) -> dict[int, None]:
-    """Return the idle slots without those that saw a point of a walk which no other slot saw."""
-    needed = {slot for point in points if all(each in idle for each in point.seen) for slot in point.seen}
-    return {slot: None for slot in idle if slot not in needed}
 
 
 def past_dead(command: ToWall | FollowWall, silent: Collection[int]) -> ToWall | FollowWall:
