@@ -245,6 +245,7 @@ class WallWalks:
         """Let the robot that waits at a station follow walls, as far as the station sees it. Its heading is unknown."""
         robot = self._sources.waiting[base]
         cycle, station = self._pushing.cycle, self._slots.occupant[base]
+        way = 0.0, 0.0  # from the station, by odometry: a walk begins where the one before has ended
         for bearing in FIRST_BEARINGS_RAD:
             to_wall = ToWall(cycle, bearing, FIRST_HOP_M, 0.0, -1, 0.0)
             walked = yield from self._order(robot, to_wall)
@@ -255,7 +256,8 @@ class WallWalks:
             if walked is None:  # dead: the next cycle releases another robot
                 del self._sources.waiting[base], self._sources.blocked[base]
                 return ()
-            if walked.driven_m > CLEAR_M:
+            way = way[0] + walked.x_m, way[1] + walked.y_m
+            if max(walked.driven_m, math.hypot(*way)) > CLEAR_M:
                 del self._sources.waiting[base], self._sources.blocked[base]
                 self._slots.add(robot)
                 return (robot,)

@@ -37,6 +37,8 @@ PROBED_RAD_MAX: Final = math.radians(150.0)
 # Without a coordinator only arcs up to this width [rad] are probed: a walk closes a wide arc as a whole, and what a probe
 # leaves of it is hard to close.
 SLIVER_RAD_MAX: Final = math.radians(20.0)
+# Walks set out into narrower arcs only where no wide one has attempts left: a narrow one is the rest of what was seen before.
+WIDE_RAD: Final = math.radians(60.0)
 # Attempts to join two parts of the swarm by the same slot.
 JOINS_MAX: Final = 4
 
@@ -107,17 +109,21 @@ class WallPlans:
         return found
 
     def plans(self, scan: ScanResult) -> Iterator[Plan]:
-        """Yield a plan for each open arc that has attempts left."""
+        """Yield a plan for each open arc that has attempts left, of the wide ones if there are any."""
         yield from self._joins(scan)
         unproven: dict[int, None] = {}
+        wide, narrow = list[Plan](), list[Plan]()
         for slot, arcs in self.open_arcs(scan).items():
             if not scan.complex_.neighbours[slot]:
                 continue
             neighbours = scan.complex_.neighbours[slot]
             found, exhausted = self.plans_at(slot, {each: scan.views[slot][each] for each in neighbours}, arcs)
-            yield from found
+            wide_arcs = [each for each in arcs if each.width_rad >= WIDE_RAD]
+            for plan in found:
+                (wide if contains(wide_arcs, Arc(plan.direction, 0.0)) else narrow).append(plan)
             if exhausted:
                 unproven[slot] = None
+        yield from wide or narrow
         self.unproven = tuple(unproven)
 
     def plans_at(self, slot: int, beside: Mapping[int, float], arcs: Iterable[Arc]) -> tuple[list[Plan], int]:
