@@ -112,18 +112,16 @@ class WallPlans:
         """Yield a plan for each open arc that has attempts left, of the wide ones if there are any."""
         yield from self._joins(scan)
         unproven: dict[int, None] = {}
-        wide, narrow = list[Plan](), list[Plan]()
+        wanted: list[Plan] = []
         for slot, arcs in self.open_arcs(scan).items():
             if not scan.complex_.neighbours[slot]:
                 continue
             neighbours = scan.complex_.neighbours[slot]
             found, exhausted = self.plans_at(slot, {each: scan.views[slot][each] for each in neighbours}, arcs)
-            wide_arcs = [each for each in arcs if each.width_rad >= WIDE_RAD]
-            for plan in found:
-                (wide if contains(wide_arcs, Arc(plan.direction, 0.0)) else narrow).append(plan)
+            wanted += found
             if exhausted:
                 unproven[slot] = None
-        yield from wide or narrow
+        yield from [each for each in wanted if not each.narrow] or wanted
         self.unproven = tuple(unproven)
 
     def plans_at(self, slot: int, beside: Mapping[int, float], arcs: Iterable[Arc]) -> tuple[list[Plan], int]:
@@ -157,6 +155,7 @@ class WallPlans:
                     beside=tried >= ANYWHERE_MAX,
                     half_rad=max(0.0, before - hand * aside_rad),
                     aside_rad=aside_rad,
+                    narrow=arc.width_rad < WIDE_RAD,
                 )
             )
         return found, exhausted
