@@ -2,7 +2,7 @@
 
 The place of a touched point is not known well, so the way closes a part of a body beyond it. When the robot has followed the
 same wall with its other hand too, it knows more: nothing beyond the two points is left out, and only what is between them
-counts. Otherwise the part beyond a corner would hide what lies behind it.
+counts, or what comes before the end of the other way. Otherwise the part beyond a corner would hide what lies behind it.
 """
 
 import math
@@ -29,14 +29,20 @@ def between_begins(near: Sequence[NearArc]) -> list[NearArc]:
 
 
 def _shortened(arc: NearArc, near: Iterable[NearArc]) -> NearArc:
-    """Return an arc up to where the way with the other hand begins, if that one is close enough to be the same point."""
+    """Return an arc up to where a way with the other hand begins, if that one is close enough to be the same point, or ends.
+
+    A way that comes along the wall and ends beyond the point has found no more of it.
+    """
     left = arc.begin_rad
     begin = _begin_of(arc)
     for each in near:
-        if each.begin_rad > 0.0 and each.hand == -arc.hand and each.robot == arc.robot != ANYONE:
+        if each.hand == -arc.hand and each.robot == arc.robot != ANYONE and not each.is_past_end:
             beyond = arc.hand * math.remainder(_begin_of(each) - begin, math.tau)
-            if abs(beyond) <= arc.begin_rad + each.begin_rad:
+            if each.begin_rad > 0.0 and abs(beyond) <= arc.begin_rad + each.begin_rad:
                 left = min(left, max(beyond, 0.0))
+            beyond = arc.hand * math.remainder(_edge_of(each.arc, arc.hand) - begin, math.tau)
+            if beyond > 0.0:
+                left = min(left, beyond)
     (start, width), cut = arc.arc, arc.begin_rad - left
     return arc._replace(arc=Arc(start if arc.hand > 0 else start + cut, width - cut))
 

@@ -69,6 +69,7 @@ def test_a_narrow_opening_is_not_passed_by(seed: int, dies: bool, more: tuple[st
             832, 2, False, (EXACT, BRIEF), id="a chicane of 1.6 bodies, of which a robot sees a part from afar"
         ),
         pytest.param(853, 2, True, (EXACT,), id="a body in a door of 1.3 bodies beside three robots in line"),
+        pytest.param(943, 3, False, (EXACT,), id="a bend of 2 bodies, past whose corner a way along the wall begins"),
         pytest.param(776, 3, True, (EXACT,), id="a body in a bend of 1.8 bodies beside three robots in line"),
     ],
 )
