@@ -27,8 +27,8 @@ class Plan(NamedTuple):
     the robots at the `anchors`. `path` leads from a source to the mover, once a path is assigned. With `walk` the robot
     drives to a wall, `aside_rad` to the left of the direction, and follows it, with the wall at its `hand` (+1 left, -1 right).
     It begins past the edge of the open arc, `half_rad` beside where it drives. With `beside` it stays in sight of the mover's
-    slot. It stops where it sees a slot of `meet`. `narrow` states that the open arc is narrow. With `waits` the robots behind
-    it follow after those of all earlier plans of the cycle.
+    slot. It stops where it sees a slot of `meet`. With `waits` the robots behind it follow after those of all earlier
+    plans of the cycle.
     """
 
     key: tuple[int, ...]
@@ -44,7 +44,6 @@ class Plan(NamedTuple):
     meet: tuple[int, ...] = ()
     half_rad: float = 0.0
     aside_rad: float = 0.0
-    narrow: bool = False
     waits: bool = False
 
     @property

@@ -112,16 +112,18 @@ class WallPlans:
         """Yield a plan for each open arc that has attempts left, of the wide ones if there are any."""
         yield from self._joins(scan)
         unproven: dict[int, None] = {}
-        wanted: list[Plan] = []
+        wide, narrow = list[Plan](), list[Plan]()
         for slot, arcs in self.open_arcs(scan).items():
             if not scan.complex_.neighbours[slot]:
                 continue
             neighbours = scan.complex_.neighbours[slot]
             found, exhausted = self.plans_at(slot, {each: scan.views[slot][each] for each in neighbours}, arcs)
-            wanted += found
+            wide_arcs = [each for each in arcs if each.width_rad >= WIDE_RAD]
+            for plan in found:
+                (wide if contains(wide_arcs, Arc(plan.direction, 0.0)) else narrow).append(plan)
             if exhausted:
                 unproven[slot] = None
-        yield from [each for each in wanted if not each.narrow] or wanted
+        yield from wide or narrow
         self.unproven = tuple(unproven)
 
     def plans_at(self, slot: int, beside: Mapping[int, float], arcs: Iterable[Arc]) -> tuple[list[Plan], int]:
@@ -155,7 +157,6 @@ class WallPlans:
                     beside=tried >= ANYWHERE_MAX,
                     half_rad=max(0.0, before - hand * aside_rad),
                     aside_rad=aside_rad,
-                    narrow=arc.width_rad < WIDE_RAD,
                 )
             )
         return found, exhausted

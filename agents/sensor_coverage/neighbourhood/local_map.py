@@ -7,7 +7,7 @@ import cmath
 import math
 from collections.abc import Callable
 from itertools import islice
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.decisions import FrontierService, SlotCoverageProof
 from zwerm.agents.sensor_coverage.frontier.directions import wrapped
@@ -22,9 +22,15 @@ from zwerm.agents.sensor_coverage.neighbourhood.attempt_exchange import attempts
 from zwerm.agents.sensor_coverage.neighbourhood.neighbour_table import NeighbourTable
 from zwerm.agents.sensor_coverage.neighbourhood.obstructions import Obstructions
 from zwerm.agents.sensor_coverage.neighbourhood.references import Displaced, References
-from zwerm.agents.sensor_coverage.neighbourhood.route_costs import DOUBT_COST, GAP_COST, WALL_COST, wall_cost
 from zwerm.agents.sensor_coverage.protocols.path_vector import PathVectorProtocol
 from zwerm.maths.simplicial import Edge, FlagComplex, edge
+
+# Cost of a route to a robot that does not know yet whether it is at the frontier. Other robots do not push there.
+DOUBT_COST: Final = 1_000.0
+# Added cost of a route to a robot at a gap. Gaps are expanded when no edge can be expanded and no robot is in doubt.
+GAP_COST: Final = 10_000.0
+# The same for a robot with an open arc, from which a robot must follow a wall. That comes after all edges and gaps.
+WALL_COST: Final = 20_000.0
 
 
 class FrontierMakers(NamedTuple):
@@ -285,7 +291,7 @@ class LocalMap(NeighbourTable):
     def best_plan(self) -> Plan | None:
         """Return the plan to carry out here, or None."""
         wanted = self.plans or self.gaps or self.wall_plans
-        return min(wanted, key=lambda each: (each.narrow, each.key)) if wanted else None
+        return min(wanted, key=lambda each: each.key) if wanted else None
 
     def note_attempt(self, plan: Plan) -> None:
         """Record that a plan is tried."""
@@ -356,7 +362,7 @@ class LocalMap(NeighbourTable):
         placed = self.slot not in (0, NOWHERE)
         cost = None
         if placed:
-            cost = 0.0 if self.plans else GAP_COST if self.gaps else wall_cost(self.wall_plans)
+            cost = 0.0 if self.plans else GAP_COST if self.gaps else WALL_COST if self.wall_plans else None
         obstacle_cost = self.parameters.obstacle_cost
         weights = {
             state.slot: obstacle_cost if edge(self.slot, state.slot) in self.obstacle else 1.0
