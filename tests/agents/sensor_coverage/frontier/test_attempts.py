@@ -4,7 +4,9 @@ import math
 
 import pytest
 
+from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
+from zwerm.agents.sensor_coverage.frontier.proofs.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.wall_plans import (
     AT_EDGE_MAX,
@@ -13,7 +15,8 @@ from zwerm.agents.sensor_coverage.frontier.wall_plans import (
     ROUNDS_MAX,
     WallPlans,
 )
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc
+from zwerm.maths.simplicial import FlagComplex
 
 OPEN = Arc(0.5, 1.0)
 BESIDE = {0: 3.0}  # a neighbour in another direction
@@ -95,3 +98,22 @@ def test_an_arc_between_walls_or_between_robots_is_tried_in_its_middle(beside: d
     walls = WallPlans(PlannerParameters(), Slots(), None)
     ((plan,), _) = walls.plans_at(4, beside, [Arc(1.0, 0.2)])
     assert plan.aim == plan.direction == pytest.approx(1.1)
+
+
+@pytest.mark.parametrize(
+    ("closed_rad", "movers"),
+    [
+        pytest.param((6.0, 0.0), {1}, id="slot 1 has a wide arc"),
+        pytest.param((6.0, 6.0), {0, 1}, id="both have narrow arcs only"),
+        pytest.param((0.0, 0.0), {0, 1}, id="both have wide arcs"),
+    ],
+)
+def test_walks_go_into_narrow_arcs_only_where_no_slot_has_a_wide_one(
+    closed_rad: tuple[float, float], movers: set[int]
+) -> None:
+    slots, views = Slots(), {0: {1: 0.0}, 1: {0: math.pi}}
+    for slot, width_rad in enumerate(closed_rad):
+        slots.add(slot)
+        slots.near[slot] = [NearArc(Arc(0.1, width_rad), 0)] if width_rad else []
+    walls = WallPlans(PlannerParameters(), slots, SwarmProof())
+    assert {each.mover for each in walls.plans(ScanResult(views, FlagComplex(views), ()))} == movers
