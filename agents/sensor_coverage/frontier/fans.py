@@ -16,6 +16,11 @@ Pair = tuple[int, int]
 Beyond = Mapping[tuple[int, int], bool]
 
 
+def pair_of(slot: int, other: int) -> Pair:
+    """Return the two slots, the lower number first."""
+    return (slot, other) if slot < other else (other, slot)
+
+
 def fan_of(
     point: WalkPoint,
     views: Mapping[int, Mapping[int, float]],

@@ -16,6 +16,8 @@ from zwerm.agents.sensor_coverage.frontier.strips.robots_in_touch import BODY_RA
 from zwerm.agents.sensor_coverage.frontier.strips.seen_stretch import SeenStep, SeenStretch, SeenTouch
 from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import (
     SightEnd,
+    beside_edge,
+    borders_of,
     is_passed,
     united_round,
     within_ends,
@@ -34,6 +36,7 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     complement,
     contains,
     ends_at,
+    united,
 )
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 from zwerm.agents.sensor_coverage.messages.commands import NearWalls
@@ -134,7 +137,7 @@ class SlotProof:
         contacts = self._at_walls if self._slot == 0 else self._contacts
         near = [within_ends(each) for each in united_round(self._near)]
         ways = [within_ends(each) for each in self._near]
-        loose = [each for each in self._edges if not (each.witnesses or is_passed(each, ways))]
+        loose = [edge for each in self._edges if not each.witnesses and not is_passed(edge := beside_edge(each), ways)]
         edged = [arc for each in stretches for arc in each.edged_arcs(standing, touched)]
         edged += without_edges([*contacts, *near], loose)
         return complement([*self._by_view, *fans, *self._by_walks.counting(standing), *edged])
@@ -238,9 +241,11 @@ class SlotProof:
         """Add an edge of sight beside a point that this slot saw."""
         self._open = None
         edge = SightEnd(sight.direction_rad, self._others(witnesses), sight.seen)
-        self._edges[edge] = None
+        closed = list[Arc]()
         if sight.stretch is not None:
             sight.stretch.add_edge(edge)
+            closed = united(sight.stretch.arcs(self._scan.complex_.neighbours, self._touched))
+        self._edges |= dict.fromkeys(borders_of(edge, closed))
 
     def end_walk(self, walk: int, last_number: int = 0, end: int = NOWHERE) -> None:
         """Keep the arcs that a walk has closed, but not its steps: it is over.

@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Final
 
-from zwerm.agents.sensor_coverage.frontier.fans import Pair, side_of
+from zwerm.agents.sensor_coverage.frontier.fans import Pair, pair_of, side_of
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.frontier.proofs.passed_points import Passed, passes
 from zwerm.agents.sensor_coverage.frontier.proofs.point_triangles import PointTriangles
@@ -127,7 +127,7 @@ class SwarmProof:
     def _fans(self, slot: int) -> Iterator[Fan]:
         """Yield the triangles with points that count at a slot."""
         for other in self._neighbours[slot]:
-            for number in self._choose(_pair_of(slot, other)).values():
+            for number in self._choose(pair_of(slot, other)).values():
                 if (slot, other) in self._triangles.pairs(number):
                     point = self._points[number]
                     _, *more = self._origins.arcs_of_triangle((slot, other), number, point, self._views)
@@ -211,7 +211,7 @@ class SwarmProof:
         """Return the arcs of a slot that are open without the triangle on one side of an edge."""
         fans = list[Arc]()
         for other in self._neighbours[slot]:
-            its_pair = _pair_of(slot, other)
+            its_pair = pair_of(slot, other)
             numbers = self._choose(its_pair)
             kept = (number for its_side, number in numbers.items() if its_pair != pair or its_side != side)
             for each in kept:
@@ -299,7 +299,7 @@ class SwarmProof:
                 continue
             self._settled[slot] = None
             for other in sorted(self._neighbours[slot]):
-                pair = _pair_of(slot, other)
+                pair = pair_of(slot, other)
                 for side, numbers in self._candidates(pair).items():
                     opened = {each: self._open_without(each, pair, side) for each in pair}
                     chosen = self._choose(pair)
@@ -336,9 +336,19 @@ class SwarmProof:
             return ()
         standing = [slot for slot in point.seen if slot in self._neighbours]
         at_walls = {(slot, side): self._ends_beyond(slot, number, side) for slot in standing for side in (1, -1)}
-        views, origins = self._views, self._origins
-        without = *origins.beside(number, views), *self._behind_bodies(point, standing)
+        views = self._views
+        beside = (pair for pair in self._origins.beside(number, views) if not self._closes_beyond(*pair, point))
+        without = *beside, *self._behind_bodies(point, standing)
         return self._triangles.find(number, point, views, self._neighbours, self._versions, at_walls, without)
+
+    def _closes_beyond(self, slot: int, other: int, point: WalkPoint) -> bool:
+        """Return whether the other slot closes by walls what is beyond its triangle with a slot and a point beside it."""
+        walls = self._wall_arcs.get(other)
+        return (
+            walls is not None
+            and other in point.seen
+            and walls.close_beyond(self._views[other][slot], point.seen[other])
+        )
 
     def _behind_bodies(self, point: WalkPoint, standing: Iterable[int]) -> Iterator[Pair]:
         """Yield (slot, other) if the other slot sees a point where it relies on the slot's robot in touch."""
@@ -381,18 +391,9 @@ class SwarmProof:
         Another wall may end at a corner before the point, and nobody sees the space behind the corner. Beside a robot in
         touch with the walking robot all walls count, and so they do beyond the wall that a robot touched close to its slot.
         """
-        point = self._points[number]
+        point, walls = self._points[number], self._wall_arcs[slot]
         if slot in point.robots:
-            return ends_at(self._wall_arcs[slot].followed, point.seen[slot], side)
-        if any(
-            ends_at(self._wall_arcs[slot].followed, each, side) for each in self._origins.touched(slot, number, side)
-        ):
+            return ends_at(walls.followed, point.seen[slot], side)
+        if any(ends_at(walls.followed, each, side) for each in self._origins.touched(slot, number, side)):
             return True
-        return ends_at(
-            self._wall_arcs[slot].by_stretch.get(self._triangles.stretch_of(number), ()), point.seen[slot], side
-        )
-
-
-def _pair_of(slot: int, other: int) -> Pair:
-    """Return the two slots, the lower number first."""
-    return (slot, other) if slot < other else (other, slot)
+        return ends_at(walls.by_stretch.get(self._triangles.stretch_of(number), ()), point.seen[slot], side)

@@ -11,6 +11,7 @@ from zwerm.agents.sensor_coverage.frontier.strips.crossings import (
     crossings_of_step,
 )
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import Pocket
+from zwerm.agents.sensor_coverage.frontier.strips.robots_in_touch import BODY_RAD
 from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import SightEnd, edged_arcs, shortened
 from zwerm.agents.sensor_coverage.frontier.strips.way_begins import between_begins
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
@@ -20,7 +21,9 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     NearArc,
     arcs_into,
     arcs_of_walls,
+    complement,
     contains,
+    overlap,
     united,
 )
 
@@ -52,6 +55,16 @@ class WallArcs(NamedTuple):
         return contains(self.edged, Arc(there, 0.0)) and (
             contains(united(self.by_stretch.get(stretch, ())), beside) or contains(near, beside)
         )
+
+    def close_beyond(self, to_slot: float, to_point: float) -> bool:
+        """Return whether walls close all directions beyond a triangle with another slot and a point, in these directions [rad].
+
+        The robot stands beside the point. Where it was pushed meanwhile, it sees the point in another direction.
+        """
+        turn = math.remainder(to_point - to_slot, math.tau)
+        width = math.pi - abs(turn) + BODY_RAD
+        beyond = Arc(to_point - BODY_RAD if turn > 0.0 else to_point + BODY_RAD - width, width)
+        return not any(overlap(each, beyond) > 0.0 for each in complement(self.edged))
 
 
 class StepCrossings:
@@ -92,13 +105,13 @@ def find_wall_arcs(
     crossings: dict[int, list[Crossing]] = {}
     beside: dict[tuple[int, bool], tuple[int, Pocket]] = {}  # by stretch and end, with the hand
     edges: dict[int, list[SightEnd]] = {}
-    dark: list[SightEnd] = []
+    dark: dict[int, list[SightEnd]] = {}
     for passed in points:
         hand, stretch = passed.hand, passed.stretch
         if all(any(each in standing for each in witnesses) for witnesses in passed.between):
             crossings.setdefault(stretch, []).extend(crossings_of(passed, standing))
         edges.setdefault(stretch, []).extend(each for each in passed.sight_ends if each.is_loose(standing))
-        dark += (each for each in passed.dark_ends if each.is_loose(standing))
+        dark.setdefault(stretch, []).extend(each for each in passed.dark_ends if each.is_loose(standing))
         for first_number, pocket in passed.pockets:
             contacts += arcs_beside_pocket(hand, pocket, touched_by(pocket.robot))
             if pocket.in_touch or (first_number, pocket.is_last) not in beside:

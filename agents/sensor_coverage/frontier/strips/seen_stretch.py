@@ -1,6 +1,6 @@
 """A stretch of wall as one slot saw it followed, without a coordinator: the directions of the slot that end at the wall."""
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from itertools import product
 from typing import Final, NamedTuple
 
@@ -26,6 +26,7 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     arcs_into,
     overlap,
     shared_arcs,
+    united,
 )
 from zwerm.agents.sensor_coverage.messages.beacons import NOWHERE
 
@@ -129,18 +130,19 @@ class SeenStretch:
 
     def edged_arcs(self, standing: Collection[int], contacts: tuple[float, ...] = ()) -> list[Arc]:
         """Return the arcs that are closed while these slots stand, without the directions beside loose edges of sight."""
-        return without_edges(
-            self.arcs(standing, contacts), (each for each in self._hiding_edges() if not each.witnesses)
-        )
+        closed = self.arcs(standing, contacts)
+        loose = [each for each in self._hiding_edges() if not each.witnesses]
+        return without_edges(closed, _beside(loose, closed))
 
     def keyed_arcs(self, contacts: Collection[float] = ()) -> Iterator[KeyedArc]:
         """Yield the arcs that are closed, with what they depend on: also on the slots that tie the ends.
 
         `contacts` are directions [rad] of walls in touch.
         """
-        edges = self._hiding_edges()
-        for each in self._keyed_arcs(contacts):
-            yield from _divided(each, edges)
+        edges, keyed = self._hiding_edges(), list(self._keyed_arcs(contacts))
+        beside = list(zip(edges, _beside(edges, [each.arc for each in keyed]), strict=True))
+        for each in keyed:
+            yield from _divided(each, beside)
 
     def _hiding_edges(self) -> list[SightEnd]:
         """Return the edges of sight behind which a wall may be hidden: without those that a walk passed in sight.
@@ -151,7 +153,7 @@ class SeenStretch:
         """
         if self._hiding is None:
             passed = self._passed() if self._edges else []
-            self._hiding = [each for each in self._edges if not is_passed(each, passed)]
+            self._hiding = [each for each in self._edges if not is_passed(beside_edge(each), passed)]
         return self._hiding
 
     def _passed(self) -> list[Arc]:
@@ -220,14 +222,23 @@ class SeenStretch:
                 yield KeyedArc((), seen, arc)
 
 
-def _divided(keyed: KeyedArc, edges: Iterable[SightEnd]) -> list[KeyedArc]:
-    """Return the parts of an arc: beside an edge of sight they count until its witness is lost, or need NOWHERE."""
+def _beside(edges: Sequence[SightEnd], closed: Iterable[Arc]) -> list[Arc]:
+    """Return the directions beside each edge of sight of a stretch that closes some arcs."""
+    whole = united(closed) if edges else ()
+    return [beside_edge(each, whole) for each in edges]
+
+
+def _divided(keyed: KeyedArc, edges: Iterable[tuple[SightEnd, Arc]]) -> list[KeyedArc]:
+    """Return the parts of an arc: beside an edge of sight they count until its witness is lost, or need NOWHERE.
+
+    Each edge is with the directions beside it.
+    """
     parts = [keyed]
-    for edge in edges:
+    for edge, beside in edges:
         divided = list[KeyedArc]()
         for needed, seen, arc in parts:
-            divided += (KeyedArc(needed, seen, each) for each in without_edges([arc], [edge]))
-            for each in shared_arcs(arc, beside_edge(edge)):
+            divided += (KeyedArc(needed, seen, each) for each in without_edges([arc], [beside]))
+            for each in shared_arcs(arc, beside):
                 divided.append(KeyedArc(_union(needed, (NOWHERE,)), seen, each))
                 if NOWHERE not in needed:
                     divided += (KeyedArc(needed, _union(seen, (one,)), each) for one in edge.witnesses[:WITNESSES_MAX])

@@ -26,6 +26,10 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
 
 # Directions [rad] beside a loose edge that its stretch of wall does not close.
 BESIDE_EDGE_RAD: Final = math.radians(5.0)
+# A wall that a robot touches ends up to this angle [rad] beside the direction of the robot: as seen by a robot in touch.
+AT_WALL_RAD: Final = math.radians(30.0)
+# Edges closer [rad] are one.
+SAME_EDGE_RAD: Final = math.radians(1.0)
 
 
 class SightEnd(NamedTuple):
@@ -78,26 +82,43 @@ def _beside(slot: int, number: int, points: Sequence[WalkPoint], step: int) -> i
     return other
 
 
-def without_edges(arcs: Iterable[Arc], ends: Iterable[SightEnd]) -> list[Arc]:
-    """Return the arcs of one stretch of wall without the directions beside loose edges of sight."""
+def without_edges(arcs: Iterable[Arc], edges: Iterable[Arc]) -> list[Arc]:
+    """Return arcs without the directions beside loose edges of sight (`beside_edge`)."""
     found = list(arcs)
-    for end in ends:
-        edge = beside_edge(end)
+    for edge in edges:
         found = [part for each in found for part in _outside(each, edge)]
     return found
 
 
-def beside_edge(end: SightEnd) -> Arc:
-    """Return the arc of the directions beside an edge of sight."""
-    return Arc(end.direction_rad - BESIDE_EDGE_RAD, 2.0 * BESIDE_EDGE_RAD)
+def beside_edge(end: SightEnd, stretch: Sequence[Arc] = ()) -> Arc:
+    """Return the arc of the directions beside an edge of sight of a stretch of wall, which closes the arcs `stretch`.
+
+    Where the stretch ends before the direction of the robot that followed it, its end is the edge, too.
+    """
+    first = last = 0.0
+    if not contains(stretch, Arc(end.direction_rad, 0.0)):
+        borders = (border for start, width in stretch for border in (start, start + width))
+        off = min((math.remainder(each - end.direction_rad, math.tau) for each in borders), key=abs, default=0.0)
+        if abs(off) < AT_WALL_RAD:
+            first, last = min(off, 0.0), max(off, 0.0)
+    return Arc(end.direction_rad + first - BESIDE_EDGE_RAD, last - first + 2.0 * BESIDE_EDGE_RAD)
 
 
-def is_passed(end: SightEnd, followed: Iterable[Arc]) -> bool:
-    """Return whether one of these arcs contains all directions beside an edge of sight.
+def borders_of(end: SightEnd, stretch: Sequence[Arc]) -> Iterator[SightEnd]:
+    """Yield an edge of sight, and the end of its stretch of wall as another one if it is elsewhere; see `beside_edge`."""
+    start, width = beside_edge(end, stretch)
+    yield end
+    for off in (BESIDE_EDGE_RAD, width - BESIDE_EDGE_RAD):
+        if abs(math.remainder(start + off - end.direction_rad, math.tau)) > SAME_EDGE_RAD:
+            yield end._replace(direction_rad=math.remainder(start + off, math.tau))
+
+
+def is_passed(edge: Arc, followed: Iterable[Arc]) -> bool:
+    """Return whether one of these arcs contains all directions beside an edge of sight (`beside_edge`).
 
     Each arc is of one walk along a wall, without a break: then nothing is hidden behind the edge.
     """
-    return contains(followed, beside_edge(end))
+    return contains(followed, edge)
 
 
 def united_round(arcs: Iterable[Arc]) -> list[Arc]:
@@ -115,22 +136,26 @@ def edged_arcs(
     edges: Mapping[int, Sequence[SightEnd]],
     contacts: Sequence[Arc],
     near: Sequence[Arc],
-    dark: Iterable[SightEnd],
+    dark: Mapping[int, Sequence[SightEnd]],
 ) -> list[Arc]:
     """Return what stretches of wall, contacts, and walls close to the slot close beside edges of sight. The arcs are disjoint.
 
-    `by_stretch` and `edges` have the arcs and the loose edges of each stretch, and `dark` the dark ones of them.
+    `by_stretch` has the arcs of each stretch, `edges` its loose edges, and `dark` the dark ones of them.
     """
-    loose = [edge for each in edges.values() for edge in each]
-    found = without_edges([*contacts, *near], [each for each in loose if not is_passed(each, near)])
-    dark = [each for each in dark if not is_passed(each, near)]
+    whole = {stretch: united(each) for stretch, each in by_stretch.items()}
+    beside = {stretch: [beside_edge(each, whole.get(stretch, ())) for each in ends] for stretch, ends in edges.items()}
+    found = without_edges(
+        [*contacts, *near], [each for ends in beside.values() for each in ends if not is_passed(each, near)]
+    )
+    lost = (beside_edge(each, whole.get(stretch, ())) for stretch, ends in dark.items() for each in ends)
+    left = [each for each in lost if not is_passed(each, near)]
     for stretch, each in by_stretch.items():
-        kept = without_edges(each, edges.get(stretch, ()))
+        kept = without_edges(each, beside.get(stretch, ()))
         found += kept
-        if dark:
-            whole = united_round(kept)
-            dark = [edge for edge in dark if not is_passed(edge, whole)]
-    return united(without_edges(found, dark))
+        if left:
+            parts = united_round(kept)
+            left = [edge for edge in left if not is_passed(edge, parts)]
+    return united(without_edges(found, left))
 
 
 def shortened(near: Iterable[NearArc]) -> list[Arc]:

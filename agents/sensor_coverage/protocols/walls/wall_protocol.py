@@ -285,7 +285,7 @@ class WallProtocol(Component):
         if local_map.proof.pass_step(passed.push, None if received is None else received.step, step, stretch, occupied):
             self._replan_at = tick + PASSED_TICKS
             self._outbox.append(Outgoing(sender, ArcClosed(passed.push)))
-        nodes = {each: node for node, each in slots.items()}
+        nodes = {each: node for node, each in self._slots().items()}  # not all of them saw this point
         for each, arc in dict.fromkeys(local_map.proof.for_neighbours):
             if each in nodes:  # else its robot has left since the step before
                 self._outbox.append(Outgoing(nodes[each], NeighbourProved(each, arc)))

@@ -70,6 +70,9 @@ def test_a_narrow_opening_is_not_passed_by(seed: int, dies: bool, more: tuple[st
         ),
         pytest.param(853, 2, True, (EXACT,), id="a body in a door of 1.3 bodies beside three robots in line"),
         pytest.param(943, 3, False, (EXACT,), id="a bend of 2 bodies, past whose corner a way along the wall begins"),
+        pytest.param(
+            969, 1, True, (EXACT, BRIEF), id="a body in a chicane of 1.5 bodies, past whose corner another wall ends"
+        ),
         pytest.param(776, 3, True, (EXACT,), id="a body in a bend of 1.8 bodies beside three robots in line"),
     ],
 )

@@ -54,6 +54,9 @@ def test_robots_alone_pass_by_no_narrow_opening(seed: int, dies: bool, more: tup
         pytest.param(
             763, 1, True, NOISE, id="noise, a robot that died in a chicane of 1.5 bodies on its way to a slot"
         ),
+        pytest.param(
+            952, 1, True, NOISE, id="noise, a body in a door of 2.8 bodies, and a neighbour that had stood for a moment"
+        ),
         pytest.param(722, 1, True, EXACT, id="a body, and three robots that rely on each other in a circle"),
     ],
 )

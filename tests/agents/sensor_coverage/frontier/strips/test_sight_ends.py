@@ -9,6 +9,7 @@ from zwerm.agents.sensor_coverage.frontier.proofs.passed_points import left_at_b
 from zwerm.agents.sensor_coverage.frontier.proofs.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import (
     SightEnd,
+    beside_edge,
     dark_ends_at,
     shortened,
     sight_ends_at,
@@ -195,11 +196,28 @@ def test_two_walls_that_meet_where_a_robot_left_one_at_a_body_leave_an_arc_open(
 
 
 def test_an_edge_is_cut_out_of_the_arcs_of_its_stretch() -> None:
-    ends = [SightEnd(0.0, ())]
+    ends = [beside_edge(SightEnd(0.0, ()))]
     assert degrees(without_edges([arc(-40, 40)], ends)) == [(320, 355), (5, 40)]
     assert degrees(without_edges([arc(2, 40)], ends)) == [(5, 40)]
     assert degrees(without_edges([arc(-40, -2)], ends)) == [(320, 355)]
     assert degrees(without_edges([arc(-3, 3), arc(90, 180)], ends)) == [(90, 180)]
+
+
+@pytest.mark.parametrize(
+    ("stretch", "beside"),
+    [
+        pytest.param((), (355, 5), id="no arc"),
+        pytest.param((arc(-20, 40),), (355, 5), id="in an arc"),
+        pytest.param((arc(9, 40),), (355, 14), id="the robot is 9 degrees beside the end of the wall"),
+        pytest.param((arc(-40, -9),), (346, 5), id="on the other side"),
+        pytest.param((arc(9, 40), arc(-40, -4)), (351, 5), id="the closer end"),
+        pytest.param((arc(31, 60),), (355, 5), id="too far to be in touch"),
+    ],
+)
+def test_the_end_of_the_wall_beside_the_robot_that_followed_it_is_an_edge_of_sight_too(
+    stretch: tuple[Arc, ...], beside: tuple[int, int]
+) -> None:
+    assert degrees([beside_edge(SightEnd(0.0, ()), stretch)]) == [beside]
 
 
 def test_an_arc_close_to_a_slot_that_is_narrower_than_an_edge_is_left_out() -> None:
