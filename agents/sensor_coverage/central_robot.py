@@ -190,7 +190,7 @@ class CentralRobot(Controller):
         """Return to the point of rest if displaced, average bearings if anything has changed, and report."""
         motion, frame = self.motion, self.motion.frame
         if motion.rest is not None:
-            motion.rest = yield from self._return_to_rest(motion.rest)
+            motion.rest_at((yield from self._return_to_rest(motion.rest)))
         frame.forget(command.moved)
         if self.setup.node in command.moved:
             frame.forget()
@@ -215,7 +215,9 @@ class CentralRobot(Controller):
                 yield velocity
 
     def _report(self, cycle: int, sightings: tuple[Sighting, ...] | None, home: bool) -> Report:
-        return Report(cycle, sightings, self.motion.frame.touched, home, self.motion.frame.touched_robots)
+        frame, pushed = self.motion.frame, self.motion.pushed
+        self.motion.pushed = 0.0, 0.0
+        return Report(cycle, sightings, frame.touched, home, frame.touched_robots, pushed)
 
     def _return_to_rest(self, rest: Vector) -> Generator[BodyVelocity, None, Vector]:
         return self.motion.return_to_rest(rest)

@@ -228,8 +228,8 @@ class SensorCoverageCoordinator:
         slots.learn_headings(robot for robot, report in sorted(reports.items()) if report.sightings is not None)
         slot_of = slots.slot_of()
         for robot, report in sorted(reports.items()):
-            walls = [bearing + slots.heading[robot] for bearing in report.touched]
-            slots.touch(slot_of[robot], walls, report.robots)
+            slots.note_push(slot_of[robot], report.pushed)
+            slots.touch(slot_of[robot], [each + slots.heading[robot] for each in report.touched], report.robots)
         views = slots.views()
         slots.learn_references(views)
         for robot, (station, report) in at_station.items():

@@ -13,6 +13,7 @@ import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from operator import itemgetter
+from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.directions import (
     DISPLACED_M_MIN,
@@ -36,8 +37,11 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
 )
 from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
 
+# A robot that was pushed this far [m] off its place sees the walls close to it in other directions.
+NEAR_M: Final = 0.03
+NOBODY: Final = -2
 # Length [m] of a leg of a walk that the next leg repeats, so that the wall between them is one stretch.
-JOINED_M = 1.0
+JOINED_M: Final = 1.0
 
 
 class Slots:
@@ -73,6 +77,8 @@ class Slots:
             tuple[int, int], tuple[int | None, int | None]
         ] = {}  # the robots at both, at the last reading
         self._displaced: dict[int, None] = {}
+        # By slot: the robot, and how far [m] others have pushed it since its way along walls close by counts, and in all.
+        self._pushed: dict[int, tuple[int, tuple[float, float], tuple[float, float]]] = {}
         self._next = 0
 
     # --- slots and occupants ----------------------------------------------------------------------------------------
@@ -262,6 +268,31 @@ class Slots:
         """Record all arcs of walls close to a slot, along which the robot there drove."""
         self.near[slot] = list(arcs)
         self._near_robot[slot] = self.occupant[slot]
+
+    def note_push(self, slot: int, way: tuple[float, float]) -> None:
+        """Note the way (x, y) [m] by which others have pushed the robot at a slot, in its own frame.
+
+        In a passage they push it on again and again, along its lines of sight to the others. What it saw before closes nothing
+        where it stands now: at first that is its own way along walls close to it.
+        """
+        if way == (0.0, 0.0):
+            return
+        robot, (x, y), stands = self.occupant[slot], way, (0.0, 0.0)
+        pushed, near, far = self._pushed.get(slot, (robot, stands, stands))
+        if pushed != robot:
+            near = far = stands
+        near, far = (near[0] + x, near[1] + y), (far[0] + x, far[1] + y)
+        if math.hypot(*far) > DISPLACED_M_MIN:
+            near = far = stands
+            self._displaced[slot] = None
+            self._forget_walls({slot: None})
+        elif math.hypot(*near) > NEAR_M:
+            near = stands
+            if slot in self._near_robot:
+                self._near_robot[slot] = NOBODY
+            if any(each.begins_at(slot) for each in self.walks):
+                self.walks = [each.unseen_by((slot,)) if each.begins_at(slot) else each for each in self.walks]
+        self._pushed[slot] = robot, near, far
 
     def take_replaced(self) -> tuple[int, ...]:
         """Forget the arcs that count for the former robots of slots at which others stand now, and return these slots.

@@ -171,6 +171,10 @@ class Walk(NamedTuple):
         origin = None if self.origin is None else self.origin._replace(at=turned_vector(self.origin.at, by))
         return self._replace(frame=frame, points=tuple(each.turned(by) for each in self.points), origin=origin)
 
+    def begins_at(self, slot: int) -> bool:
+        """Return whether all points are close to a slot, which the robot left."""
+        return self.origin is not None and self.origin.slot == slot
+
     def way_from_origin(self) -> Iterator[tuple[float, WalkPoint]]:
         """Yield the direction [rad] of each point from the origin by odometry, and the point."""
         if self.origin is not None:

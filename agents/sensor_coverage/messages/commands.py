@@ -212,7 +212,8 @@ class Report(_UplinkMessage, frozen=True, tag="report"):
     """The answer to a scan request or a roll call.
 
     `sightings` is None if nothing has changed. `touched` are bearings [rad] of touched walls, and `robots` are touched
-    robots. `home`: the robot still stands where it came out of the depot.
+    robots. `home`: the robot still stands where it came out of the depot. `pushed` is the way (x, y) [m], in its own frame, by
+    which others have pushed it away for good since its latest report.
     """
 
     cycle: int
@@ -220,6 +221,7 @@ class Report(_UplinkMessage, frozen=True, tag="report"):
     touched: tuple[float, ...]
     home: bool = False
     robots: tuple[int, ...] = ()
+    pushed: tuple[float, float] = (0.0, 0.0)
 
 
 class LeftComplex(Report, frozen=True, tag="left-complex"):

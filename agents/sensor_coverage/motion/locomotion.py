@@ -21,6 +21,8 @@ Drive = Generator[BodyVelocity, None, None]
 
 # Bearings with a standard deviation below this [rad] count as exact.
 EXACT_RAD = 1e-5
+# A robot that was pushed this far [m] sees the walls close to it in other directions.
+FAR_M: Final = 0.05
 # Ticks that a displaced robot may take to return before it reports: a scan waits for it.
 RETURN_TICKS_MAX = 20
 
@@ -28,7 +30,8 @@ RETURN_TICKS_MAX = 20
 class Locomotion:
     """Readings and means of driving of one robot.
 
-    `rest` is the point where the robot must stand, in its odometry frame, or None if it never drove.
+    `rest` is the point where the robot must stand, in its odometry frame, or None if it never drove. `pushed` is the way [m] by
+    which other robots have pushed it away for good since.
     `bearing_noise_rad` is the standard deviation of a bearing, which the robot measures itself, or None before that.
     """
 
@@ -39,6 +42,7 @@ class Locomotion:
         self.radius_m = setup.body.radius_m if setup.body is not None else 0.0
         self.frame = OdometryFrame()
         self.rest: Vector | None = None
+        self.pushed: Vector = 0.0, 0.0
         self.bearing_noise_rad: float | None = None
         self._dt_s = setup.dt_s
 
@@ -64,7 +68,18 @@ class Locomotion:
     def settle(self) -> None:
         """End a drive: the robot rests here, and earlier averages no longer hold."""
         self.frame.forget()
-        self.rest = self.position
+        self.rest, self.pushed = self.position, (0.0, 0.0)
+
+    def rest_at(self, rest: Vector, on_far: Callable[[], None] | None = None) -> None:
+        """Rest at a point to which other robots have pushed this one.
+
+        Call `on_far`, if given, if they have pushed it so far that it sees other walls close by, and count anew.
+        """
+        x_m, y_m = rest if self.rest is None else self.rest
+        self.rest, self.pushed = rest, (self.pushed[0] + rest[0] - x_m, self.pushed[1] + rest[1] - y_m)
+        if on_far is not None and math.hypot(*self.pushed) > FAR_M:
+            self.pushed = 0.0, 0.0
+            on_far()
 
     def average(self, enough: Callable[[int], bool]) -> Drive:
         """Stand still and average bearings until `enough(samples)` holds, or for twice as many ticks as samples."""

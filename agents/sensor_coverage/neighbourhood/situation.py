@@ -293,6 +293,7 @@ class Situation:
         if self._recoveries > RECOVERIES_MAX:
             self._recoveries = 0
             self.local_map.begin_drive()  # neighbours average its bearing again
+            self.motion.rest_at(self.motion.position, self.local_map.forget_walls)
             self.motion.settle()
             self.stand()
             self.look_around()
@@ -386,7 +387,8 @@ class Situation:
         self.local_map.update_walls(frame.touched, frame.touched_robots)
 
     def _recover(self, rest: Vector) -> Drive:
-        self.motion.rest = yield from self.motion.return_to_rest(rest, lambda: self.local_map.set_displaced(True))
+        rest = yield from self.motion.return_to_rest(rest, lambda: self.local_map.set_displaced(True))
+        self.motion.rest_at(rest, self.local_map.forget_walls)
         self.local_map.set_displaced(False)
         self.check_at_base(BESIDE_BASE_M)
 

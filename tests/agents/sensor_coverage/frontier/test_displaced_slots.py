@@ -6,7 +6,7 @@ from itertools import pairwise
 import pytest
 
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, Walk, WalkPoint
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, Origin, Walk, WalkPoint
 from zwerm.agents.sensor_coverage.messages.pushes import ReferenceBearing
 from zwerm.agents.sensor_coverage.neighbourhood.references import Displaced, References
 
@@ -53,6 +53,38 @@ def test_what_a_slot_saw_of_walls_remains_when_its_robot_stands_there(robot: int
     assert slots.take_displaced() == ()
     assert slots.near[1] == [NearArc(Arc(0.0, 1.0), 1)]
     assert slots.walks is walks
+
+
+@pytest.mark.parametrize(
+    ("pushes", "left", "seen"),
+    [
+        pytest.param([0.02, -0.02, 0.02], 2, True, id="to and fro"),
+        pytest.param([0.02, 0.02], 1, False, id="again and again: its own way along walls close by counts no more"),
+        pytest.param([0.02, 0.02, 0.02, 0.02, 0.03], 0, False, id="far: nothing counts that the slot saw of walls"),
+    ],
+)
+def test_what_a_slot_saw_of_walls_falls_when_others_push_its_robot_on(
+    pushes: list[float], left: int, seen: bool
+) -> None:
+    slots = three_slots()
+    slots.walks.append(Walk(10, 1, (WalkPoint({1: 0.5, 2: 1.5}, (0.0,), ()),), origin=Origin(1, (0.0, 0.0), 11)))
+    slots.note_near(1, [NearArc(Arc(0.0, 1.0), 1, 11), NearArc(Arc(0.0, 0.5), 1)])
+    for each in pushes:
+        slots.note_push(1, (each, 0.0))
+    slots.take_replaced()
+    assert len(slots.near.get(1, ())) == left
+    assert (1 in slots.walks[1].points[0].seen) is seen
+    assert (1 in slots.walks[0].points[0].seen) is (slots.take_displaced() == ())
+
+
+def test_another_robot_at_a_slot_was_not_pushed_yet() -> None:
+    slots = three_slots()
+    slots.note_push(1, (0.09, 0.0))
+    slots.occupant[1] = 13
+    slots.note_push(1, (0.09, 0.0))
+    assert slots.take_displaced() == ()
+    slots.note_push(1, (0.02, 0.0))
+    assert slots.take_displaced() == (1,)
 
 
 def test_both_slots_are_displaced_when_no_robot_is_new() -> None:
