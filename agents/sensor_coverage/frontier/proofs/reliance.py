@@ -22,7 +22,8 @@ class Fan(NamedTuple):
     """A triangle of a slot, the `other` slot and a point, which the slot sees in these directions [rad].
 
     `from_other` is the direction of the point from the other slot. `more` are directions beyond the point that end at a wall
-    in touch there.
+    in touch there. `beyond` are directions that the other slot closes only by triangles of robots before this slot: it sees
+    the slot and the point between two robots, and leaves what is behind these to them.
     """
 
     other: int
@@ -30,6 +31,7 @@ class Fan(NamedTuple):
     to_point: float
     from_other: float
     more: Sequence[Arc]
+    beyond: Sequence[Arc] = ()
 
     def arcs(self, gaps: Iterable[Arc]) -> list[Arc]:
         """Return the arcs that the triangle closes at the slot if the other slot has these gaps.
@@ -40,7 +42,7 @@ class Fan(NamedTuple):
         off = math.remainder(self.to_point - self.to_other, math.tau)
         side = math.copysign(1.0, off)
         turned = side * math.remainder(self.from_other - self.to_point, math.tau)
-        free = min((self._begin(each, side) for each in gaps), default=math.pi) + SHARED_RAD - turned
+        free = min((self._begin(each, side) for each in (*gaps, *self.beyond)), default=math.pi) + SHARED_RAD - turned
         width = min(abs(off), max(free, 0.0))
         start = self.to_point - width if side > 0.0 else self.to_point
         return [Arc(start, width), *self.more]

@@ -15,9 +15,9 @@ from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.frontier.proofs.passed_points import Passed, passes
 from zwerm.agents.sensor_coverage.frontier.proofs.point_triangles import PointTriangles
 from zwerm.agents.sensor_coverage.frontier.proofs.reliance import Fan, circular_gaps
+from zwerm.agents.sensor_coverage.frontier.proofs.robot_arcs import RobotArcs
 from zwerm.agents.sensor_coverage.frontier.proofs.walk_origins import WalkOrigins
 from zwerm.agents.sensor_coverage.frontier.proofs.wall_arcs import ArcBasis, StepCrossings, WallArcs, find_wall_arcs
-from zwerm.agents.sensor_coverage.frontier.strips.robots_in_touch import arcs_of_robot
 from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import with_islands
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     Arc,
@@ -65,7 +65,7 @@ class SwarmProof:
         self._chosen: dict[Pair, dict[int, int]] = {}  # the numbers of the points of triangles beside an edge, by side
         self._open_arcs: dict[int, list[Arc]] = {}
         self._alone: dict[Pair, list[Arc]] = {}  # what is closed at the first slot without the second
-        self._by_robots: dict[tuple[int, ...], list[Arc]] = {}  # what robots close at the first slot without these
+        self._by_robots = RobotArcs({}, {}, {}, {})
         self._settled: dict[int, None] = {}  # open slots that no other choice of points closes better
 
     def update(
@@ -111,6 +111,7 @@ class SwarmProof:
         left = dict.fromkeys(
             slot for each in (*gone, *back) for passed in self._passed.get(each, ()) for slot in passed.point.seen
         )
+        self._by_robots = RobotArcs(self._neighbours, self._views, self._around, self._wall_arcs)
         self._refresh(changed | left, gone)
         return tuple(slot for slot in left if slot in self._around)
 
@@ -131,7 +132,16 @@ class SwarmProof:
                 if (slot, other) in self._triangles.pairs(number):
                     point = self._points[number]
                     _, *more = self._origins.arcs_of_triangle((slot, other), number, point, self._views)
-                    yield Fan(other, self._views[slot][other], point.seen[slot], point.seen[other], more)
+                    beyond = self._beyond_robots(slot, other)
+                    yield Fan(other, self._views[slot][other], point.seen[slot], point.seen[other], more, beyond)
+
+    def _beyond_robots(self, slot: int, other: int) -> list[Arc]:
+        """Return the arcs that the other slot closes only by triangles of robots before this slot."""
+        kept = self._by_robots.not_before(slot, other)
+        if kept is None:
+            return []
+        walls = *self._wall_arcs[other].followed, *arcs_of_walls(self._around[other].touched)
+        return complement([*kept, *walls, *self._arcs_of_fans(other)])
 
     # --- what has changed -------------------------------------------------------------------------------------------
 
@@ -209,49 +219,28 @@ class SwarmProof:
 
     def _open_without(self, slot: int, pair: Pair | None, side: int) -> list[Arc]:
         """Return the arcs of a slot that are open without the triangle on one side of an edge."""
-        fans = list[Arc]()
-        for other in self._neighbours[slot]:
-            its_pair = pair_of(slot, other)
-            numbers = self._choose(its_pair)
-            kept = (number for its_side, number in numbers.items() if its_pair != pair or its_side != side)
-            for each in kept:
-                if (slot, other) in self._triangles.pairs(each):
-                    fans += self._origins.arcs_of_triangle((slot, other), each, self._points[each], self._views)
-        touched, beside = arcs_of_walls(self._around[slot].touched), self._closed_by_robots(slot)
+        fans = list(self._arcs_of_fans(slot, pair, side))
+        touched, beside = arcs_of_walls(self._around[slot].touched), self._by_robots.all(slot)
         opened = complement([*self._wall_arcs[slot].followed, *touched, *beside, *fans])
         contacts = touched if slot in self._bases else ()  # a station cannot look behind what it touches
         return with_islands(opened, [*self._wall_arcs[slot].edged, *contacts, *beside, *fans])
+
+    def _arcs_of_fans(self, slot: int, pair: Pair | None = None, side: int = 0) -> Iterator[Arc]:
+        """Yield the arcs of a slot that triangles with points close, without the triangle on one side of an edge."""
+        for other in self._neighbours[slot]:
+            its_pair = pair_of(slot, other)
+            for its_side, number in self._choose(its_pair).items():
+                if (slot, other) in self._triangles.pairs(number) and (its_pair != pair or its_side != side):
+                    point = self._points[number]
+                    yield from self._origins.arcs_of_triangle((slot, other), number, point, self._views)
 
     def _closed_without_fans(self, slot: int) -> list[Arc]:
         """Return the arcs of a slot that walls and triangles of robots close."""
         return [
             *self._wall_arcs[slot].followed,
             *arcs_of_walls(self._around[slot].touched),
-            *self._closed_by_robots(slot),
+            *self._by_robots.all(slot),
         ]
-
-    def _closed_by_robots(self, slot: int) -> list[Arc]:
-        """Return the arcs of a slot that triangles of robots and robots in touch close."""
-        bodies = (arc for each in self._around[slot].in_touch for arc in self._arcs_of_body(slot, each))
-        return [*bodies, *self._arcs_between(slot)]
-
-    def _arcs_of_body(self, slot: int, other: int) -> Iterator[Arc]:
-        """Return the arcs in which a slot relies on another one whose robot is in touch with its own."""
-        touched = self._around[slot].touched
-        followed = self._wall_arcs[other].edged if other in self._wall_arcs else ()
-        return arcs_of_robot(self._views[slot][other], touched, self._views[other][slot], followed)
-
-    def _arcs_between(self, slot: int, without: Collection[int] = (), before: Collection[int] = ()) -> Iterator[Arc]:
-        """Yield the arcs of a slot in its triangles of robots, but those with other slots, and those `before` other slots.
-
-        A triangle is before a slot that shares edges with the two others.
-        """
-        view, around = self._views[slot], self._neighbours
-        beside = around[slot].difference(without)
-        for a in beside:
-            for b in beside & around[a]:
-                if a < b and not any(a in around[each] and b in around[each] for each in before if each in around):
-                    yield arc_between(view[a], view[b])
 
     def _choose(self, pair: Pair) -> dict[int, int]:
         """Return the number of the point of the triangle on each side of an edge: the one that closes most at both ends.
@@ -355,7 +344,7 @@ class SwarmProof:
         for other in standing:
             there = Arc(point.seen[other], 0.0)
             for slot in self._around[other].in_touch:
-                if slot in point.seen and contains(self._arcs_of_body(other, slot), there):
+                if slot in point.seen and contains(self._by_robots.of_body(other, slot), there):
                     yield slot, other
 
     def _is_proved(self, slot: int, there: float, other: int) -> bool:
@@ -368,7 +357,7 @@ class SwarmProof:
         known = self._alone.get((slot, other))
         if known is None:
             edged = self._wall_arcs[slot].edged if slot in self._wall_arcs else ()
-            closed = *edged, *arcs_of_walls(self._around[slot].touched), *self._arcs_between(slot, (other,))
+            closed = *edged, *arcs_of_walls(self._around[slot].touched), *self._by_robots.between(slot, (other,))
             known = self._alone[slot, other] = united(closed)
         return contains(known, Arc(there, 0.0))
 
@@ -382,7 +371,7 @@ class SwarmProof:
         if slot not in self._neighbours:
             return False
         near = (each.arc for each in self._around[slot].near)
-        walls, robots = self._wall_arcs[slot], self._arcs_between(slot, pair, pair)
+        walls, robots = self._wall_arcs[slot], self._by_robots.between(slot, pair, pair)
         return contains(robots, Arc(there, 0.0)) or walls.lies_at(there, stretch, near)
 
     def _ends_beyond(self, slot: int, number: int, side: int) -> bool:

@@ -64,3 +64,12 @@ def test_only_rays_that_come_to_a_gap_of_the_other_slot_stay_open(
     left = circular_gaps(gaps, {0: [fan(1, 0.0, side * 60.0, side * 120.0)]})
     expected = {} if open_deg is None else {0: [turned(arc(*open_deg))]}
     assert degrees({0: left.get(0, [])}) == degrees({0: expected.get(0, [])})
+
+
+def test_a_slot_that_sees_another_one_between_two_robots_leaves_what_is_behind_them_to_these() -> None:
+    """Slot 6 stands in the mouth of a bend, between robots on both sides, and sees slot 3 and a point beside it past these."""
+    gap = {3: [arc(24, 95)]}
+    past = fan(6, -178.2, 13.1, 6.8)
+    assert circular_gaps(gap, {3: [past]}) == {}
+    left = circular_gaps(gap, {3: [past._replace(beyond=[arc(11.8, 89)])]})
+    assert degrees(left) == {3: [(24, 95)]}
