@@ -1,6 +1,6 @@
 """The points of a walk along a wall that each slot saw."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStretch, Pocket, StretchEnd
@@ -17,7 +17,7 @@ class Passed(NamedTuple):
     point before to this one. `pockets` are set if the walking robot touched the slot's robot beside an end, each with the
     number of the first point of its stretch. `sight_ends` are set where the slot did not see the next point. `dark_ends` are
     the same with the origin of the walk among the slots that saw it, and those where the robot left the wall at a body.
-    `ties` are the slots that tie an end of the stretch at this point.
+    `ties` are the slots that tie an end of the stretch at this point. `beside` are the points before and after it.
     """
 
     number: int
@@ -31,6 +31,11 @@ class Passed(NamedTuple):
     sight_ends: tuple[SightEnd, ...] = ()
     dark_ends: tuple[SightEnd, ...] = ()
     ties: tuple[int, ...] = ()
+    beside: tuple[WalkPoint, ...] = ()
+
+    def without_next(self, slot: int) -> "Passed":
+        """Return the same point beside one that counts no more: nobody that stands answers for what is there."""
+        return self._replace(dark_ends=(*self.dark_ends, SightEnd(self.point.seen[slot], ())))
 
 
 def passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
@@ -42,7 +47,7 @@ def passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
     touch = TouchCounter()
     stretch_of = stretches_of(walk)
     stretches = list({each.first_number: each for each in stretch_of.values()}.values())
-    at_bodies = left_at_bodies(walk.points)
+    at_bodies = left_at_bodies(walk.points, stretch_of)
     # No other slot relies on what the origin saw: that counts while its robot stands there.
     others = walk.points if walk.origin is None else [each.unseen_by((walk.origin.slot,)) for each in walk.points]
     for number, point in enumerate(walk.points):
@@ -67,13 +72,12 @@ def passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
             between = between if before is not None else ()
             edges = tuple(sight_ends_at(slot, number, others, walk.end))
             dark = tuple(dark_ends_at(slot, number, walk.points))
-            if number in at_bodies:
-                dark = (*dark, SightEnd(point.seen[slot], ()))
+            dark = (*dark, *(SightEnd(point.seen[slot], each) for each in at_bodies.get(number, ())))
             ties = () if here is None else _ties_at(number, here)
-            yield (
-                slot,
-                Passed(first + number, before, point, walk.hand, between, number_of, ends, pockets, edges, dark, ties),
+            found = Passed(
+                first + number, before, point, walk.hand, between, number_of, ends, pockets, edges, dark, ties
             )
+            yield slot, found._replace(beside=walk.points[max(0, number - 1) : number + 2])
             last[slot] = now
 
 
@@ -84,18 +88,24 @@ def _ties_at(number: int, stretch: FollowedStretch) -> tuple[int, ...]:
     return (*first, *last)
 
 
-def left_at_bodies(points: Sequence[WalkPoint]) -> set[int]:
+def left_at_bodies(
+    points: Sequence[WalkPoint], stretch_of: Mapping[int, FollowedStretch]
+) -> dict[int, tuple[tuple[int, ...], ...]]:
     """Return the numbers of the points of a walk between which the robot left a wall at a body, and came to another one.
 
-    Between them may be an opening that the body fills. A slot that looks along it sees both walls in one direction.
+    Between them may be an opening that the body fills. A slot that looks along it sees both walls in one direction. Each
+    robot that stood there at a slot answers for it: its slot is in a tuple of its own. The tuple of a body is empty.
     """
-    touch, found = TouchCounter(), set[int]()
-    latest, at_body = -1, False
+    touch, found = TouchCounter(), dict[int, tuple[tuple[int, ...], ...]]()
+    latest, at_body, robots = -1, False, dict[int, None]()
     for number, point in enumerate(points):
         touch.take(number, point.walls, point.at_body, point.left_walls)
-        at_body = at_body or point.at_body
+        at_body, robots = at_body or point.at_body, robots | dict.fromkeys(point.robots)
         if point.walls:
-            if latest >= 0 and at_body and touch.since > latest:
-                found |= {latest, number}
-            latest, at_body = number, point.at_body
+            if latest >= 0:
+                other_wall = stretch_of.get(latest) is None or stretch_of.get(latest) is not stretch_of.get(number)
+                answers = ((),) if at_body and touch.since > latest else tuple((each,) for each in robots if other_wall)
+                for each in (latest, number) if answers else ():
+                    found[each] = found.get(each, ()) + answers
+            latest, at_body, robots = number, point.at_body, dict.fromkeys(point.robots)
     return found

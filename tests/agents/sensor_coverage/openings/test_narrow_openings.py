@@ -77,6 +77,9 @@ def test_a_narrow_opening_is_not_passed_by(seed: int, dies: bool, more: tuple[st
             953, 1, False, (EXACT, LIMIT), id="a chicane of 1.6 bodies, in which robots push another one on and on"
         ),
         pytest.param(1030, 1, False, (NOISE,), id="noise, a bend of 1.9 bodies, seen between two robots at its mouth"),
+        pytest.param(
+            1062, 2, True, (NOISE,), id="noise, a chicane of 1.8 bodies, from which a robot kept a walk, and died"
+        ),
         pytest.param(776, 3, True, (EXACT,), id="a body in a bend of 1.8 bodies beside three robots in line"),
     ],
 )

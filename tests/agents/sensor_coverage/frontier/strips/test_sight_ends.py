@@ -17,6 +17,7 @@ from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import (
     with_islands,
     without_edges,
 )
+from zwerm.agents.sensor_coverage.frontier.strips.stretches import stretches_of
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, Walk, WalkPoint
 from zwerm.maths.simplicial import FlagComplex
 
@@ -48,6 +49,7 @@ def open_at_0(*walks: tuple[WalkPoint, ...], near: tuple[NearArc, ...] = ()) -> 
 
 BEFORE = point(_0=150), point(_0=200), point(_0=250)
 BEYOND = point(_0=250), point(_0=290), point(_0=330)
+AT_ROBOT = WalkPoint({0: math.radians(250)}, (), (7,))
 AT_BODY = WalkPoint({0: math.radians(250)}, (), (), at_body=True)
 
 
@@ -173,17 +175,22 @@ def test_a_slot_that_saw_the_next_point_counts_for_a_dark_edge_also_if_the_walk_
 @pytest.mark.parametrize(
     ("between", "left"),
     [
-        pytest.param((), set(), id="the same wall"),
-        pytest.param((AT_BODY,), {1, 3}, id="a body, then another wall"),
-        pytest.param((AT_BODY, AT_BODY, AT_BODY, AT_BODY), {1, 6}, id="a long way round a body"),
-        pytest.param((point()._replace(walls=()),), set(), id="a corner"),
+        pytest.param((), {}, id="the same wall"),
+        pytest.param((AT_BODY,), {1: ((),), 3: ((),)}, id="a body, then another wall"),
+        pytest.param((AT_BODY, AT_BODY, AT_BODY, AT_BODY), {1: ((),), 6: ((),)}, id="a long way round a body"),
+        pytest.param((point()._replace(walls=()),), {}, id="a corner"),
+        pytest.param(
+            (AT_ROBOT,), {1: ((7,),), 3: ((7,),)}, id="a robot at a slot, which answers for what is behind it"
+        ),
+        pytest.param((AT_ROBOT, AT_ROBOT._replace(robots=(8,))), {1: ((7,), (8,)), 4: ((7,), (8,))}, id="two robots"),
     ],
 )
 def test_a_robot_that_leaves_a_wall_at_a_body_may_have_passed_an_opening(
-    between: tuple[WalkPoint, ...], left: set[int]
+    between: tuple[WalkPoint, ...], left: dict[int, tuple[tuple[int, ...], ...]]
 ) -> None:
     other = point(_0=40)._replace(walls=(math.pi,) if between else SOUTH)
-    assert left_at_bodies((point(_0=10), point(_0=20), *between, other, point(_0=50))) == left
+    walk = Walk(0, -1, (point(_0=10), point(_0=20), *between, other, point(_0=50)))
+    assert left_at_bodies(walk.points, stretches_of(walk)) == left
 
 
 @pytest.mark.parametrize(("between", "opened"), [(AT_BODY, [(245, 255), (330, 150)]), (None, [(330, 150)])])
@@ -193,6 +200,19 @@ def test_two_walls_that_meet_where_a_robot_left_one_at_a_body_leave_an_arc_open(
     """A slot that looks along an opening sees the walls on both sides of it in one direction."""
     round_it = () if between is None else (between,)
     assert sorted(open_at_0((*BEFORE, *round_it, *(each._replace(walls=(math.pi,)) for each in BEYOND)))) == opened
+
+
+@pytest.mark.parametrize(("gone", "opened"), [(False, [(330, 150)]), (True, [(245, 255), (330, 150)])])
+def test_a_point_beside_one_that_counts_no_more_is_an_edge(gone: bool, opened: list[tuple[int, int]]) -> None:
+    """Slot 1 saw the middle of a walk. When its robot is gone, two other walls do not close the edges together."""
+    middle = WalkPoint({0: math.radians(252), 1: 0.0}, SOUTH, ())
+    sides = (point(_0=220), point(_0=235), point(_0=251)), (point(_0=249), point(_0=265), point(_0=280))
+    walks = [Walk(0, -1, each) for each in ((*BEFORE, middle), (middle, *BEYOND), *sides)]
+    proof = SwarmProof()
+    proof.update(SCAN, walks, {}, {}, {})
+    if gone:
+        proof.update(ScanResult({0: {}}, FlagComplex({0: set()}), ()), walks, {}, {}, {})
+    assert sorted(degrees(proof.open_arcs()[0])) == opened
 
 
 def test_an_edge_is_cut_out_of_the_arcs_of_its_stretch() -> None:
