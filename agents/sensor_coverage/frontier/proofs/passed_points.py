@@ -17,7 +17,7 @@ class Passed(NamedTuple):
     point before to this one. `pockets` are set if the walking robot touched the slot's robot beside an end, each with the
     number of the first point of its stretch. `sight_ends` are set where the slot did not see the next point. `dark_ends` are
     the same with the origin of the walk among the slots that saw it, and those where the robot left the wall at a body.
-    `ties` are the slots that tie an end of the stretch at this point. `beside` are the points before and after it.
+    `ties` are the slots that tie an end of the stretch at this point.
     """
 
     number: int
@@ -31,11 +31,6 @@ class Passed(NamedTuple):
     sight_ends: tuple[SightEnd, ...] = ()
     dark_ends: tuple[SightEnd, ...] = ()
     ties: tuple[int, ...] = ()
-    beside: tuple[WalkPoint, ...] = ()
-
-    def without_next(self, slot: int) -> "Passed":
-        """Return the same point beside one that counts no more: nobody that stands answers for what is there."""
-        return self._replace(dark_ends=(*self.dark_ends, SightEnd(self.point.seen[slot], ())))
 
 
 def passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
@@ -74,10 +69,10 @@ def passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
             dark = tuple(dark_ends_at(slot, number, walk.points))
             dark = (*dark, *(SightEnd(point.seen[slot], each) for each in at_bodies.get(number, ())))
             ties = () if here is None else _ties_at(number, here)
-            found = Passed(
-                first + number, before, point, walk.hand, between, number_of, ends, pockets, edges, dark, ties
+            yield (
+                slot,
+                Passed(first + number, before, point, walk.hand, between, number_of, ends, pockets, edges, dark, ties),
             )
-            yield slot, found._replace(beside=walk.points[max(0, number - 1) : number + 2])
             last[slot] = now
 
 

@@ -302,7 +302,7 @@ class SwarmProof:
     def _find_walls(self, slot: int) -> WallArcs:
         """Return the arcs of a slot that end at followed walls or at contacts."""
         passed = [
-            each if all(self._counts(one) for one in each.beside) else each.without_next(slot)
+            each
             for each in self._passed.get(slot, ())
             if self._counts(each.point) and (each.before is None or self._counts(each.before))
         ]

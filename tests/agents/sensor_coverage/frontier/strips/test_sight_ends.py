@@ -202,19 +202,6 @@ def test_two_walls_that_meet_where_a_robot_left_one_at_a_body_leave_an_arc_open(
     assert sorted(open_at_0((*BEFORE, *round_it, *(each._replace(walls=(math.pi,)) for each in BEYOND)))) == opened
 
 
-@pytest.mark.parametrize(("gone", "opened"), [(False, [(330, 150)]), (True, [(245, 255), (330, 150)])])
-def test_a_point_beside_one_that_counts_no_more_is_an_edge(gone: bool, opened: list[tuple[int, int]]) -> None:
-    """Slot 1 saw the middle of a walk. When its robot is gone, two other walls do not close the edges together."""
-    middle = WalkPoint({0: math.radians(252), 1: 0.0}, SOUTH, ())
-    sides = (point(_0=220), point(_0=235), point(_0=251)), (point(_0=249), point(_0=265), point(_0=280))
-    walks = [Walk(0, -1, each) for each in ((*BEFORE, middle), (middle, *BEYOND), *sides)]
-    proof = SwarmProof()
-    proof.update(SCAN, walks, {}, {}, {})
-    if gone:
-        proof.update(ScanResult({0: {}}, FlagComplex({0: set()}), ()), walks, {}, {}, {})
-    assert sorted(degrees(proof.open_arcs()[0])) == opened
-
-
 def test_an_edge_is_cut_out_of_the_arcs_of_its_stretch() -> None:
     ends = [beside_edge(SightEnd(0.0, ()))]
     assert degrees(without_edges([arc(-40, 40)], ends)) == [(320, 355), (5, 40)]
