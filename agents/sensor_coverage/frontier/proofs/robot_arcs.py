@@ -4,9 +4,10 @@ import math
 from collections.abc import Collection, Iterator, Mapping
 from typing import Final, NamedTuple
 
+from zwerm.agents.sensor_coverage.frontier.fans import is_between
 from zwerm.agents.sensor_coverage.frontier.proofs.wall_arcs import ArcBasis, WallArcs
 from zwerm.agents.sensor_coverage.frontier.strips.robots_in_touch import arcs_of_robot
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, arc_between, contains
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, arc_between
 
 # A robot is behind the edge of a triangle only if it is seen this far [rad] from both robots there: bearings have noise.
 BEHIND_RAD: Final = math.radians(2.0)
@@ -55,12 +56,11 @@ class RobotArcs(NamedTuple):
         around, view = self.neighbours[slot], self.views[other]
         kept, found = list(self._of_bodies(other)), False
         for a, b in self._triangles(other, ()):
-            arc = arc_between(view[a], view[b])
-            inner = Arc(arc.start_rad + BEHIND_RAD, max(0.0, arc.width_rad - 2.0 * BEHIND_RAD))
-            if slot not in (a, b) and not around.issuperset((a, b)) and contains((inner,), Arc(view[slot], 0.0)):
+            is_other = slot not in (a, b) and not around.issuperset((a, b))
+            if is_other and is_between(view[slot], view[a], view[b], BEHIND_RAD):
                 found = True
             else:
-                kept.append(arc)
+                kept.append(arc_between(view[a], view[b]))
         return kept if found else None
 
     def _triangles(self, slot: int, without: Collection[int]) -> Iterator[tuple[int, int]]:

@@ -127,13 +127,11 @@ class SwarmProof:
 
     def _fans(self, slot: int) -> Iterator[Fan]:
         """Yield the triangles with points that count at a slot."""
-        for other in self._neighbours[slot]:
-            for number in self._choose(pair_of(slot, other)).values():
-                if (slot, other) in self._triangles.pairs(number):
-                    point = self._points[number]
-                    _, *more = self._origins.arcs_of_triangle((slot, other), number, point, self._views)
-                    beyond = self._beyond_robots(slot, other)
-                    yield Fan(other, self._views[slot][other], point.seen[slot], point.seen[other], more, beyond)
+        for other, number in self._counting(slot):
+            point = self._points[number]
+            _, *more = self._origins.arcs_of_triangle((slot, other), number, point, self._views)
+            beyond = self._beyond_robots(slot, other)
+            yield Fan(other, self._views[slot][other], point.seen[slot], point.seen[other], more, beyond)
 
     def _beyond_robots(self, slot: int, other: int) -> list[Arc]:
         """Return the arcs that the other slot closes only by triangles of robots before this slot."""
@@ -227,12 +225,16 @@ class SwarmProof:
 
     def _arcs_of_fans(self, slot: int, pair: Pair | None = None, side: int = 0) -> Iterator[Arc]:
         """Yield the arcs of a slot that triangles with points close, without the triangle on one side of an edge."""
+        for other, number in self._counting(slot, pair, side):
+            yield from self._origins.arcs_of_triangle((slot, other), number, self._points[number], self._views)
+
+    def _counting(self, slot: int, pair: Pair | None = None, side: int = 0) -> Iterator[tuple[int, int]]:
+        """Yield the other slot and the number of the point of each triangle that counts at a slot, but that beside an edge."""
         for other in self._neighbours[slot]:
             its_pair = pair_of(slot, other)
             for its_side, number in self._choose(its_pair).items():
                 if (slot, other) in self._triangles.pairs(number) and (its_pair != pair or its_side != side):
-                    point = self._points[number]
-                    yield from self._origins.arcs_of_triangle((slot, other), number, point, self._views)
+                    yield other, number
 
     def _closed_without_fans(self, slot: int) -> list[Arc]:
         """Return the arcs of a slot that walls and triangles of robots close."""
