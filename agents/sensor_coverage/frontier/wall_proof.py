@@ -262,6 +262,17 @@ def leaves_wall(hand: int, before: Collection[float], now: Collection[float], x_
     return not any(-LEAVING_RAD < each < ROUNDING_RAD for each in sides)
 
 
+def is_backward(before: WalkPoint, point: WalkPoint, hand: int) -> bool:
+    """Return whether a step leads back along the wall in touch: a robot that has turned round has it at its other hand."""
+    dx, dy = point.at[0] - before.at[0], point.at[1] - before.at[1]
+    walls = (*before.walls, *point.walls)
+    if not walls or math.hypot(dx, dy) < LEAVING_M_MIN:
+        return False
+    heading = math.atan2(dy, dx)
+    sides = [-hand * math.remainder(each - heading, math.tau) for each in walls]
+    return all(CONTACT_RAD < each < math.pi - CONTACT_RAD for each in sides)
+
+
 class SeenPoint(NamedTuple):
     """A point of a walk that a slot saw, and its number in the walk."""
 

@@ -61,7 +61,7 @@ def passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
             before = point_before(slot, last.get(slot), now, touch.since, bool(between))
             there = stretch_of.get(since) if before is not None else None
             ends = () if here is None or there is None else (there.first, here.last)
-            beside = pockets_beside(slot, number, walk.points, stretches) if slot in point.robots else ()
+            beside = pockets_beside(slot, number, walk.points, stretches, walk.hand) if slot in point.robots else ()
             robot = walk.robots.get(slot, -1)
             pockets = tuple((first + first_number, each._replace(robot=robot)) for first_number, each in beside)
             between = between if before is not None else ()

@@ -22,11 +22,11 @@ from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import (
 )
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     CONTACT_RAD,
-    LEAVING_M_MIN,
     Arc,
     Crossing,
     WalkPoint,
     arc_between,
+    is_backward,
     shared_arcs,
 )
 from zwerm.agents.sensor_coverage.motion.homing import unit
@@ -58,17 +58,6 @@ def crossings_of_step(
             yield Crossing(arc_between(start + low * step, start + high * step), 1)
     else:
         yield Crossing(arc_between(start, start + step), -1)
-
-
-def is_backward(before: WalkPoint, point: WalkPoint, hand: int) -> bool:
-    """Return whether a step leads back along the wall in touch: a robot that has turned round has it at its other hand."""
-    dx, dy = point.at[0] - before.at[0], point.at[1] - before.at[1]
-    walls = (*before.walls, *point.walls)
-    if not walls or math.hypot(dx, dy) < LEAVING_M_MIN:
-        return False
-    heading = math.atan2(dy, dx)
-    sides = [-hand * math.remainder(each - heading, math.tau) for each in walls]
-    return all(CONTACT_RAD < each < math.pi - CONTACT_RAD for each in sides)
 
 
 def crossings_of_pocket(hand: int, pocket: Pocket, other_is_loose: bool) -> Iterator[Crossing]:

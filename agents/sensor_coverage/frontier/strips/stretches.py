@@ -13,7 +13,14 @@ from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import (
     direction_of,
     end_of_stretch,
 )
-from zwerm.agents.sensor_coverage.frontier.wall_proof import BLIND_MAX, POCKET_RAD, TouchCounter, Walk, WalkPoint
+from zwerm.agents.sensor_coverage.frontier.wall_proof import (
+    BLIND_MAX,
+    POCKET_RAD,
+    TouchCounter,
+    Walk,
+    WalkPoint,
+    is_backward,
+)
 from zwerm.agents.sensor_coverage.motion.homing import unit
 
 
@@ -48,17 +55,19 @@ def pocket_of(
 
 
 def pockets_beside(
-    slot: int, number: int, points: Sequence[WalkPoint], stretches: Sequence[FollowedStretch]
+    slot: int, number: int, points: Sequence[WalkPoint], stretches: Sequence[FollowedStretch], hand: int
 ) -> Iterator[tuple[int, Pocket]]:
     """Yield the pockets beside a slot whose robot the walking robot touches at a point, by the first points of their stretches.
 
-    The point has this number in its walk.
+    The point has this number in its walk, with the wall at the `hand`. A robot that passes between others and a wall has that
+    at its other hand: then what the way and the wall enclose is on the other side of the end, and there is no pocket.
     """
     point, before = points[number], None
     for each in stretches:
         ends_rad = points[each.first_number].seen.get(slot), points[each.last_number].seen.get(slot)
         pocket = pocket_of(each, number, point.at, point.seen[slot], before, ends_rad)
-        if pocket is not None:
+        first = 0 if pocket is None else each.last_number - 1 if pocket.is_last else each.first_number
+        if pocket is not None and not is_backward(points[first], points[first + 1], hand):
             yield each.first_number, pocket
         before = each.last
 

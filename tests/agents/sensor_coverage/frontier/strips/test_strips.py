@@ -181,6 +181,16 @@ def test_a_robot_between_the_end_of_a_way_and_the_wall_makes_no_pocket(wall_deg:
     assert (pocket_of(stretch, 0, (0.14, 0.0), 0.0) is not None) == bool(pockets)
 
 
+@pytest.mark.parametrize(("hand", "closed"), [(1, []), (-1, [(-80, -65)])])
+def test_a_robot_that_passes_between_robots_and_a_wall_makes_no_pocket(
+    hand: int, closed: list[tuple[int, int]]
+) -> None:
+    """It goes east, with a wall in the south, and the slot's robot in the north. It first touched the end of the wall."""
+    walk = way_along((0.3, 0.21), tuple((x, RADIUS_M) for x in (0.3, 0.35, 0.4)), SOUTH, hand)
+    first = walk.points[0]._replace(walls=(math.radians(-60.0),), robots=(0,))
+    assert closed_deg(walk._replace(points=(first, *walk.points[1:]))) == closed
+
+
 @pytest.mark.parametrize(
     ("to_walking_deg", "closed"),
     [
