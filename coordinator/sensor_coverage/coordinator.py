@@ -96,7 +96,7 @@ class SensorCoverageCoordinator:
         self.walls = planner.walls
         self._silent: dict[int, None] = {}
         parts = self.slots, self.mailbox, self.sources, self.pushing, planner
-        self.walking = WallWalks(*parts, planner.walls, self._silent)
+        self.walking = WallWalks(*parts, planner.walls, parameters.hop_m, self._silent)
         self.scan = ScanResult({}, FlagComplex({}), ())
         self.redundant: tuple[int, ...] = ()
         self.outcome = ""

@@ -16,7 +16,7 @@ from zwerm.agents.sensor_coverage.frontier.directions import angle_between, wrap
 from zwerm.agents.sensor_coverage.frontier.plan import Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.wall_plans import WallPlans
-from zwerm.agents.sensor_coverage.frontier.wall_proof import ANYONE, SAME_WALL_RAD, Origin
+from zwerm.agents.sensor_coverage.frontier.wall_proof import ANYONE, SAME_WALL_RAD, Origin, Walk
 from zwerm.agents.sensor_coverage.messages.commands import (
     LOST,
     MET,
@@ -37,6 +37,7 @@ from zwerm.agents.sensor_coverage.messages.commands import (
 )
 from zwerm.agents.sensor_coverage.motion.push_geometry import FIRST_BEARINGS_RAD
 from zwerm.agents.sensor_coverage.motion.triangulation import distances_m
+from zwerm.agents.sensor_coverage.motion.walls.passed_robots import passed_robots
 from zwerm.agents.sensor_coverage.motion.walls.wall_walk import CLEAR_M, FIRST_HOP_M, IDLE_LEGS_MAX, LEG_M
 from zwerm.coordinator.sensor_coverage.command_mailbox import CommandMailbox, Routine, run_concurrently
 from zwerm.coordinator.sensor_coverage.idle_slots import beside_others, still_idle, without_witnesses
@@ -72,7 +73,8 @@ class SetOut(NamedTuple):
 class WallWalks:
     """Walks along walls. `idle` are the slots at which a robot stands after a walk, and is not needed.
 
-    `silent` are the robots that do not answer, which may change: a walking robot pushes their bodies.
+    `reach_m` is the distance [m] up to which slots know the walls beside which a walk has passed their robots. `silent` are the
+    robots that do not answer, which may change: a walking robot pushes their bodies.
     """
 
     def __init__(
@@ -83,6 +85,7 @@ class WallWalks:
         pushing: PushExecution,
         frontier: FrontierService,
         walls: WallPlans,
+        reach_m: float,
         silent: Collection[int] = (),
     ) -> None:
         self.idle: dict[int, None] = {}
@@ -96,6 +99,7 @@ class WallWalks:
         self._pushing = pushing
         self._frontier = frontier
         self._walls = walls
+        self._reach_m = reach_m
         self._silent = silent
 
     def walk(self, plans: Iterable[Plan], scan: ScanResult) -> Routine[Moved]:
@@ -283,6 +287,7 @@ class WallWalks:
             repeats = leads_again(way, waypoints)
             way += waypoints
             number = slots.take_walk(leader, leg.hand, waypoints, walked.radius_m, number, stays, moving=others)
+            self._note_passed(slots.walks[number])
             if stays:
                 self._measure(leader, origin, there, way)
                 return
@@ -293,6 +298,12 @@ class WallWalks:
                 break
         self._measure(leader, origin, there, way)
         self.idle[slots.slot_of()[leader]] = None
+
+    def _note_passed(self, walk: Walk) -> None:
+        """Record the walls close to the slots whose robots a walk has passed, for these robots."""
+        for slot, walls, hand in passed_robots(walk, self._reach_m):
+            if self._slots.occupant.get(slot) == walk.robots[slot]:
+                self._walls.note_near(slot, walls, hand, walk.robots[slot])
 
     def keep_idle(self, scan: ScanResult) -> None:
         """Forget idle slots that are empty, and those without which a station sees no others. `scan` has all robots."""
