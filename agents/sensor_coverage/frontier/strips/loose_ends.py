@@ -85,6 +85,11 @@ def touched_point(at: Vector, bearing_rad: float, radius_m: float) -> Vector:
     return at[0] + radius_m * math.cos(bearing_rad), at[1] + radius_m * math.sin(bearing_rad)
 
 
+def place_of_robot(at: Vector, there_rad: float, radius_m: float) -> Vector:
+    """Return the place [m] of a robot in touch with one at a place, which it sees in a direction [rad]."""
+    return at[0] - 2.0 * radius_m * math.cos(there_rad), at[1] - 2.0 * radius_m * math.sin(there_rad)
+
+
 # A place [m] of the walking robot, and the directions of walls that it touches there.
 Contact = tuple[Vector, Sequence[float]]
 

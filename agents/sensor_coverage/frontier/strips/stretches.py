@@ -12,6 +12,7 @@ from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import (
     Vector,
     direction_of,
     end_of_stretch,
+    place_of_robot,
 )
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     BLIND_MAX,
@@ -21,7 +22,6 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     WalkPoint,
     is_backward,
 )
-from zwerm.agents.sensor_coverage.motion.homing import unit
 
 
 def pocket_of(
@@ -43,8 +43,7 @@ def pocket_of(
     is_last = stretch.last_number <= number <= stretch.last_number + BLIND_MAX
     if not (is_last or stretch.first_number - BLIND_MAX <= number <= stretch.first_number):
         return None
-    ux, uy = unit(there_rad)
-    place = at[0] - 2.0 * stretch.radius_m * ux, at[1] - 2.0 * stretch.radius_m * uy
+    place = place_of_robot(at, there_rad, stretch.radius_m)
     in_touch = number in (stretch.first_number, stretch.last_number)
     end = stretch.last if is_last else stretch.first
     if angle_between(direction_of(place, end.at), direction_of(place, end.touched)) > POCKET_RAD:
@@ -66,9 +65,10 @@ def pockets_beside(
     for each in stretches:
         ends_rad = points[each.first_number].seen.get(slot), points[each.last_number].seen.get(slot)
         pocket = pocket_of(each, number, point.at, point.seen[slot], before, ends_rad)
-        first = 0 if pocket is None else each.last_number - 1 if pocket.is_last else each.first_number
-        if pocket is not None and not is_backward(points[first], points[first + 1], hand):
-            yield each.first_number, pocket
+        if pocket is not None:
+            last = each.last_number if pocket.is_last else each.first_number + 1
+            if not is_backward(points[last - 1], points[last], hand):
+                yield each.first_number, pocket
         before = each.last
 
 

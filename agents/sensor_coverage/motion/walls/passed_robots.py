@@ -9,9 +9,10 @@ import math
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
+from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import place_of_robot
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Walk, WalkPoint
 from zwerm.agents.sensor_coverage.messages.commands import NearWalls
-from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
+from zwerm.agents.sensor_coverage.motion.homing import Vector
 from zwerm.agents.sensor_coverage.motion.walls.near_arcs import FollowedWay, NearPoint, walls_around
 
 
@@ -30,9 +31,8 @@ def passed_robots(walk: Walk, reach_m: float) -> Iterator[PassedRobot]:
     """
     for slot in walk.robots:
         for first, last in _contacts(walk.points, slot):
-            to_robot = unit(walk.points[first].seen[slot])
-            x_m, y_m = walk.points[first].at
-            place = x_m - 2.0 * walk.radius_m * to_robot[0], y_m - 2.0 * walk.radius_m * to_robot[1]
+            met = walk.points[first]
+            place = place_of_robot(met.at, met.seen[slot], walk.radius_m)
             for hand, points in ((-walk.hand, _before(walk.points, first)), (walk.hand, walk.points[last:])):
                 way = list(_near_points(points, slot, place, reach_m))
                 yield PassedRobot(slot, walls_around(place, FollowedWay(way, hand, walk.radius_m, True)), hand)
