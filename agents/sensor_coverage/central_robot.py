@@ -24,6 +24,7 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     Move,
     NegotiateLeave,
     Probe,
+    ProbePastDead,
     Release,
     Report,
     RobotCommand,
@@ -112,7 +113,7 @@ class CentralRobot(Controller):
     def _begin(self, command: RobotCommand) -> Drive | None:
         """Return the activity that carries out a command."""
         self._dead.clear()
-        if isinstance(command, ToWallPastDead | FollowWallPastDead):
+        if isinstance(command, ToWallPastDead | FollowWallPastDead | ProbePastDead):
             self._dead.update(dict.fromkeys(command.dead))
         match command:
             case RollCall(cycle):

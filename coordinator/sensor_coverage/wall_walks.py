@@ -29,6 +29,7 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     Move,
     NearWalls,
     Probe,
+    ProbePastDead,
     ToWall,
     ToWallPastDead,
     Walked,
@@ -59,6 +60,8 @@ LINE_OFF_M: Final = 0.02
 LINE_ALONG_M: Final = 0.1
 # A leg leads where the walk was before if each place in touch is within this distance [m] of an earlier one at the same wall.
 AGAIN_M: Final = 0.03
+# The commands that name dead robots.
+PAST_DEAD: Final = {ToWall: ToWallPastDead, FollowWall: FollowWallPastDead, Probe: ProbePastDead}
 # Dead robots that a command names at most: the ones that fell silent last. An id has 5 bytes at most.
 DEAD_MAX: Final = 500
 
@@ -344,21 +347,16 @@ class WallWalks:
 
     def _order(self, robot: int, command: ToWall | FollowWall | Probe) -> Routine[Walked | None]:
         """Return how a walk ended, or None if the robot does not answer. The command names the dead robots."""
-        if not isinstance(command, Probe):
-            command = past_dead(command, self._silent)
-        self._mailbox.send(robot, command, drive=True)
+        self._mailbox.send(robot, past_dead(command, self._silent), drive=True)
         answers = yield from self._mailbox.answers([robot], Walked)
         answer = answers.get(robot)
         return answer if isinstance(answer, Walked) else None
 
 
-def past_dead(command: ToWall | FollowWall, silent: Collection[int]) -> ToWall | FollowWall:
+def past_dead(command: ToWall | FollowWall | Probe, silent: Collection[int]) -> ToWall | FollowWall | Probe:
     """Return the command that names the robots that are silent; the same command if there are none."""
     dead = tuple(silent)[-DEAD_MAX:]
-    if not dead:
-        return command
-    named = ToWallPastDead if isinstance(command, ToWall) else FollowWallPastDead
-    return named(**msgspec.structs.asdict(command), dead=dead)
+    return PAST_DEAD[type(command)](**msgspec.structs.asdict(command), dead=dead) if dead else command
 
 
 def before_meeting(way: Sequence[Waypoint], others: Collection[int]) -> Sequence[Waypoint]:

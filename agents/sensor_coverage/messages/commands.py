@@ -205,6 +205,12 @@ class FollowWallPastDead(FollowWall, frozen=True, tag="follow-wall-past-dead"):
     dead: tuple[int, ...]
 
 
+class ProbePastDead(Probe, frozen=True, tag="probe-past-dead"):
+    """The same drive along a wall and back. The robots in `dead` do not answer, and may be pushed."""
+
+    dead: tuple[int, ...]
+
+
 # --- from a robot ---------------------------------------------------------------------------------------------------
 
 
@@ -302,6 +308,7 @@ RobotCommand = (
     | FollowWall
     | ToWallPastDead
     | FollowWallPastDead
+    | ProbePastDead
 )
 Answer = Report | LeftComplex | Released | Emerged | Cleared | Arrived | Walked | Ack
 

@@ -5,6 +5,7 @@ from collections.abc import Collection, Sequence
 
 import pytest
 
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, contains, united
 from zwerm.agents.sensor_coverage.messages.commands import Waypoint
 from zwerm.agents.sensor_coverage.motion.locomotion import STOP
 from zwerm.agents.sensor_coverage.motion.odometry_frame import OdometryFrame, Touched
@@ -15,6 +16,8 @@ from zwerm.agents.sensor_coverage.motion.walls.dead_bodies import (
     DeadBodies,
     HeldPoints,
 )
+from zwerm.agents.sensor_coverage.motion.walls.near_arcs import NearPoint, NearWay
+from zwerm.agents.sensor_coverage.motion.walls.near_points import NearPoints
 from zwerm.wire.messages import BodyVelocity
 
 BODY, OTHER = 9, 4
@@ -50,10 +53,10 @@ def bodies_of(robot: AtBody) -> DeadBodies:
     return DeadBodies(robot, (BODY,))
 
 
-def push(robot: AtBody, bodies: DeadBodies, moved_m: float = 0.0) -> list[BodyVelocity]:
-    """Carry out the push that begins after a step of this length [m] to the east, and return its velocities."""
+def push(robot: AtBody, bodies: DeadBodies, moved_m: float = 0.0, heading_deg: float = EAST) -> list[BodyVelocity]:
+    """Carry out the push that begins after a step of this length [m] and heading, and return its velocities."""
     velocities = []
-    while (velocity := bodies.step(moved_m, math.radians(EAST))) is not None:
+    while (velocity := bodies.step(moved_m, math.radians(heading_deg))) is not None:
         velocities.append(velocity)
         robot.drive(velocity)
     return velocities
@@ -88,6 +91,14 @@ def test_a_robot_that_pushes_back_lives_and_is_no_wall() -> None:
     assert bodies.firm() == ()
     assert bodies.contacts() == [Touched(EAST, BODY)]
     assert push(robot, bodies) == []
+
+
+def test_bodies_that_spring_apart_by_a_tenth_of_a_step_are_walls() -> None:
+    """So far they were pressed against the walls of a corner."""
+    robot = AtBody(fraction=0.0, back_m=0.1 * AtBody.step_m / REST_TICKS)
+    bodies = bodies_of(robot)
+    push(robot, bodies)
+    assert bodies.firm() == (EAST,)
 
 
 @pytest.mark.parametrize(
@@ -203,3 +214,33 @@ def test_points_at_a_body_are_held_back_up_to_a_number() -> None:
     assert not points
     held.take(Waypoint(0.0, 0.0, (), (), (BODY,)))
     assert len(points) == HELD_MAX + 1
+
+
+@pytest.mark.parametrize("yields", [False, True])
+def test_a_body_in_a_corner_close_to_the_start_closes_the_arc_to_the_corner_if_it_is_wall(yields: bool) -> None:
+    """A robot at its slot follows the walls of a corner at (0.18, -0.15) m, round a body there."""
+    robot, start = AtBody(fraction=0.0), (-0.1, 0.1)
+    way = NearWay(start, 1, 0.07)
+    bodies = bodies_of(robot)
+    near = NearPoints(way, lambda _: None)
+    held = HeldPoints(bodies, near.take)
+    around = [
+        ((0.11 + 0.14 * math.sin(turn), -0.08 + 0.14 * math.cos(turn)), turn) for turn in (0.0, -0.8, -math.pi / 2)
+    ]
+    touches: list[tuple[tuple[float, float], Touch]] = [
+        ((0.11, 0.10), WALL_EAST),
+        *((at, ((BODY, math.degrees(-turn) - 90.0),)) for at, turn in around),
+        ((-0.08, -0.08), WALL_SOUTH),
+    ]
+    for number, (at, touch) in enumerate(touches):
+        robot.touch(*touch)
+        robot.fraction = 0.5 if yields and number == 2 else 0.0
+        push(robot, bodies, heading_deg=-60.0)
+        walls = tuple(math.radians(degrees) for node, degrees in touch if node is None)
+        at_body = not walls
+        waypoint = Waypoint(*at, (), walls, (BODY,) if at_body else ())
+        near.expect(NearPoint(at, walls, at_body, at_body), waypoint, at_other=False)
+        held.take(waypoint)
+    held.end()
+    to_corner = Arc(math.atan2(-0.15 - start[1], 0.18 - start[0]), 0.0)
+    assert contains(united(Arc(*each) for each in way.walls().followed), to_corner) is not yields

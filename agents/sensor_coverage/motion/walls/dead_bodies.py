@@ -29,8 +29,10 @@ PUSH_TICKS: Final = 3
 # A body does not yield if the robot moves in these ticks by less than this fraction of full steps: 18 free bodies in a row
 # yield by more, and so does a body that is free in a direction within 75 degrees of the push.
 YIELD_FRACTION: Final = 0.05
-# Ticks for which the robot then stands still. A robot that lives and was displaced drives back meanwhile.
+# Ticks for which the robot then stands still. A robot that lives and was displaced drives back meanwhile, by more than this
+# fraction of a full step. Bodies that were pressed against walls only spring apart, by a tenth of a step.
 REST_TICKS: Final = 2
+BACK_FRACTION: Final = 0.2
 # A body is pushed again when its direction has turned by this [rad], or after so many ticks without a contact.
 AGAIN_RAD: Final = math.radians(25.0)
 APART_TICKS: Final = 2
@@ -181,7 +183,7 @@ class DeadBodies:
         before = motion.position
         for _ in range(REST_TICKS):
             yield BodyVelocity()
-        if math.dist(before, motion.position) > YIELD_FRACTION * motion.step_m:
+        if math.dist(before, motion.position) > BACK_FRACTION * motion.step_m:
             self._living[node] = None
         elif node in self._touched():
             self._firm[node] = _Pushed(direction_rad)

@@ -16,6 +16,7 @@ from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
 from zwerm.agents.sensor_coverage.motion.locomotion import Locomotion
 from zwerm.agents.sensor_coverage.motion.walls.dead_bodies import DeadBodies, HeldPoints
 from zwerm.agents.sensor_coverage.motion.walls.near_arcs import NearPoint, NearWay, start_in_sight
+from zwerm.agents.sensor_coverage.motion.walls.near_points import NearPoints
 from zwerm.agents.sensor_coverage.motion.walls.past_edge import EDGE_M_MAX, past_edge
 from zwerm.agents.sensor_coverage.motion.walls.touched_robots import RobotsInReach, TouchedRobots
 from zwerm.agents.sensor_coverage.motion.walls.wall_heading import hand_on_wall
@@ -78,7 +79,8 @@ class WallWalk:
         self._latest_wall_rad = 0.0  # the direction of that wall
         self._start = motion.position
         self._way_near: NearWay | None = None  # while the robot follows a wall close to the start
-        self._near_points = self._held_points(self.on_step)
+        self._near_points: NearPoints | None = None  # those of that way
+        self._held_near = self._held_points(self.on_step)
         self._in_reach = RobotsInReach(motion.radius_m)
 
     @property
@@ -136,6 +138,7 @@ class WallWalk:
 
     def _drive_back(self, way: NearWay) -> Generator[BodyVelocity, None, None]:
         """Drive back to the start of a way close to it."""
+        self._held_near.end()
         driven = list[Vector]()
         for velocity in self._motion.drive_to(self._start):
             yield velocity
@@ -145,23 +148,23 @@ class WallWalk:
     def _begin_near(self, hand: int) -> NearWay:
         """Begin to record the way along a wall from here, close to the start, with the wall at the hand."""
         way = self._way_near = NearWay(self._start, hand, self.radius_m, self._swept_only)
-        self._near_points = self._held_points(way.waypoints.append)
+        self._held_near = self._held_points(way.waypoints.append, way)
         self._in_reach.begin()
-        self._report(self._near_points)
-        way.take(self._near_point())
+        self._report(self._held_near)
         return way
 
     def _end_near(self, way: NearWay, end: str, driven_m: float) -> WalkResult:
         """End this record, and return the end of the drive."""
-        self._near_points.end()
+        self._held_near.end()
         self._touched.end()
         self._way_near = None
         return WalkResult(end, driven_m, tuple(first_of_message(way.seen_from_start())), way.walls(), way)
 
-    def _held_points(self, report: Callable[[Waypoint], None]) -> HeldPoints:
-        """Return what takes in the points of the way from here."""
+    def _held_points(self, report: Callable[[Waypoint], None], near: NearWay | None = None) -> HeldPoints:
+        """Return what takes in the points of the way from here, which is `near` its start if that is given."""
         self._touched = TouchedRobots(self._motion.radius_m, report)
-        return HeldPoints(self._bodies, self._touched.take)
+        self._near_points = None if near is None else NearPoints(near, self._touched.take)
+        return HeldPoints(self._bodies, self._touched.take if self._near_points is None else self._near_points.take)
 
     def _begin_way(self) -> Vector:
         """Begin a way from here, and return this place."""
@@ -209,8 +212,7 @@ class WallWalk:
             way_m += step_m
             stuck = stuck + 1 if step_m < STUCK_FRACTION * motion.step_m else 0
             self._trail.append(motion.position)
-            self._report(self._near_points)
-            way.take(self._near_point())
+            self._report(self._held_near)
         return True
 
     def away_from(
@@ -334,15 +336,18 @@ class WallWalk:
         point = self._waypoint()
         groups = self._motion.frame.touched_among()
         self._touched.note(point.x_m, point.y_m, [each for each in groups if not self._bodies.is_body(each[1][0])])
+        if self._near_points is not None:
+            self._expect_near(self._near_points, point)
         held.take(point)
 
-    def _near_point(self) -> NearPoint:
-        """Return the point at which the robot is now. The robot that stands where the way began does not count."""
+    def _expect_near(self, points: NearPoints, point: Waypoint) -> None:
+        """Note the point at which the robot is now. The robot that stands where the way began does not count."""
         frame, (x, y) = self._motion.frame, self.way
         back_rad = math.atan2(-y, -x)
-        robots = [each.bearing_rad for each in frame.contacts if each.node is not None]
-        at_robot = any(angle_between(each, back_rad) > ROBOT_BEHIND_RAD for each in robots)
-        return NearPoint(self._motion.position, frame.touched, self._bodies.in_touch, at_robot)
+        robots = [each for each in frame.contacts if each.node is not None]
+        beside = [each for each in robots if angle_between(each.bearing_rad, back_rad) > ROBOT_BEHIND_RAD]
+        near = NearPoint(self._motion.position, frame.touched, self._bodies.in_touch, bool(beside))
+        points.expect(near, point, any(not self._bodies.is_body(each.node) for each in beside))
 
     def _waypoint(self) -> Waypoint:
         frame, near = self._motion.frame, self._way_near
