@@ -1,12 +1,17 @@
 """The points of a walk along a wall that each slot saw."""
 
+import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
+from zwerm.agents.sensor_coverage.frontier.directions import angle_between
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStretch, Pocket, StretchEnd
 from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import SightEnd, dark_ends_at, sight_ends_at
 from zwerm.agents.sensor_coverage.frontier.strips.stretches import pockets_beside, stretches_of
 from zwerm.agents.sensor_coverage.frontier.wall_proof import SeenPoint, TouchCounter, Walk, WalkPoint, point_before
+
+# A slot sees two walls beside each other if their directions differ by this [rad]: what is between them is open there.
+ASIDE_RAD: Final = math.radians(15.0)
 
 
 class Passed(NamedTuple):
@@ -42,9 +47,9 @@ def passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
     touch = TouchCounter()
     stretch_of = stretches_of(walk)
     stretches = list({each.first_number: each for each in stretch_of.values()}.values())
-    at_bodies = left_at_bodies(walk.points, stretch_of)
     # No other slot relies on what the origin saw: that counts while its robot stands there.
     others = walk.points if walk.origin is None else [each.unseen_by((walk.origin.slot,)) for each in walk.points]
+    at_bodies = left_at_bodies(others, stretch_of)
     for number, point in enumerate(walk.points):
         touch.take(number, point.walls, point.at_body, point.left_walls)
         if point.is_blind:
@@ -89,7 +94,8 @@ def left_at_bodies(
     """Return the numbers of the points of a walk between which the robot left a wall at a body, and came to another one.
 
     Between them may be an opening that the body fills. A slot that looks along it sees both walls in one direction. Each
-    robot that stood there at a slot answers for it: its slot is in a tuple of its own. The tuple of a body is empty.
+    robot that stood there at a slot answers for it: its slot begins a tuple of its own. No robot begins the tuple of a body.
+    Slots that saw both walls, one beside the other, answer for it, too: they are open between the two.
     """
     touch, found = TouchCounter(), dict[int, tuple[tuple[int, ...], ...]]()
     latest, at_body, robots = -1, False, dict[int, None]()
@@ -100,7 +106,15 @@ def left_at_bodies(
             if latest >= 0:
                 other_wall = stretch_of.get(latest) is None or stretch_of.get(latest) is not stretch_of.get(number)
                 answers = ((),) if at_body and touch.since > latest else tuple((each,) for each in robots if other_wall)
+                aside = tuple(_seen_aside(points[latest], point))
                 for each in (latest, number) if answers else ():
-                    found[each] = found.get(each, ()) + answers
+                    found[each] = found.get(each, ()) + tuple((*robot, *aside) for robot in answers)
             latest, at_body, robots = number, point.at_body, dict.fromkeys(point.robots)
     return found
+
+
+def _seen_aside(before: WalkPoint, point: WalkPoint) -> Iterator[int]:
+    """Yield the slots that saw two points of a walk one beside the other."""
+    for slot, direction in before.seen.items():
+        if slot in point.seen and angle_between(direction, point.seen[slot]) > ASIDE_RAD:
+            yield slot

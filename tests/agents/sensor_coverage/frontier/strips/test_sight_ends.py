@@ -188,9 +188,19 @@ def test_a_slot_that_saw_the_next_point_counts_for_a_dark_edge_also_if_the_walk_
 def test_a_robot_that_leaves_a_wall_at_a_body_may_have_passed_an_opening(
     between: tuple[WalkPoint, ...], left: dict[int, tuple[tuple[int, ...], ...]]
 ) -> None:
-    other = point(_0=40)._replace(walls=(math.pi,) if between else SOUTH)
+    other = point(_0=30)._replace(walls=(math.pi,) if between else SOUTH)
     walk = Walk(0, -1, (point(_0=10), point(_0=20), *between, other, point(_0=50)))
     assert left_at_bodies(walk.points, stretches_of(walk)) == left
+
+
+@pytest.mark.parametrize(("beyond_deg", "answers"), [(80, ()), (60, (1,))])
+def test_a_slot_that_saw_both_walls_beside_each_other_answers_for_a_body_between_them(
+    beyond_deg: int, answers: tuple[int, ...]
+) -> None:
+    """It is open between the two, by itself. From slot 0 they are in one direction."""
+    other = point(_0=30, _1=beyond_deg)._replace(walls=(math.pi,))
+    walk = Walk(0, -1, (point(_0=10, _1=100), point(_0=20, _1=90), AT_BODY, other))
+    assert left_at_bodies(walk.points, stretches_of(walk)) == {1: (answers,), 3: (answers,)}
 
 
 @pytest.mark.parametrize(("between", "opened"), [(AT_BODY, [(245, 255), (330, 150)]), (None, [(330, 150)])])
