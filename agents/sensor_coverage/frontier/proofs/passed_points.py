@@ -5,10 +5,17 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.directions import angle_between
-from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStretch, Pocket, StretchEnd
+from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStretch, Pocket, StretchEnd, touched_point
 from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import SightEnd, dark_ends_at, sight_ends_at
 from zwerm.agents.sensor_coverage.frontier.strips.stretches import pockets_beside, stretches_of
-from zwerm.agents.sensor_coverage.frontier.wall_proof import SeenPoint, TouchCounter, Walk, WalkPoint, point_before
+from zwerm.agents.sensor_coverage.frontier.wall_proof import (
+    SAME_WALL_RAD,
+    SeenPoint,
+    TouchCounter,
+    Walk,
+    WalkPoint,
+    point_before,
+)
 
 # A slot sees two walls beside each other if their directions differ by this [rad]: what is between them is open there.
 ASIDE_RAD: Final = math.radians(15.0)
@@ -49,7 +56,7 @@ def passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
     stretches = list({each.first_number: each for each in stretch_of.values()}.values())
     # No other slot relies on what the origin saw: that counts while its robot stands there.
     others = walk.points if walk.origin is None else [each.unseen_by((walk.origin.slot,)) for each in walk.points]
-    at_bodies = left_at_bodies(others, stretch_of)
+    at_bodies = left_at_bodies(others, stretch_of, walk.radius_m)
     for number, point in enumerate(walk.points):
         touch.take(number, point.walls, point.at_body, point.left_walls)
         if point.is_blind:
@@ -89,13 +96,14 @@ def _ties_at(number: int, stretch: FollowedStretch) -> tuple[int, ...]:
 
 
 def left_at_bodies(
-    points: Sequence[WalkPoint], stretch_of: Mapping[int, FollowedStretch]
+    points: Sequence[WalkPoint], stretch_of: Mapping[int, FollowedStretch], radius_m: float
 ) -> dict[int, tuple[tuple[int, ...], ...]]:
     """Return the numbers of the points of a walk between which the robot left a wall at a body, and came to another one.
 
     Between them may be an opening that the body fills. A slot that looks along it sees both walls in one direction. Each
     robot that stood there at a slot answers for it: its slot begins a tuple of its own. No robot begins the tuple of a body.
-    Slots that saw both walls, one beside the other, answer for it, too: they are open between the two.
+    Slots that saw both walls, one beside the other, answer for it, too: they are open between the two. No opening is between
+    two points of a wall that are closer to each other than a body of `radius_m` [m] is wide.
     """
     touch, found = TouchCounter(), dict[int, tuple[tuple[int, ...], ...]]()
     latest, at_body, robots = -1, False, dict[int, None]()
@@ -103,7 +111,7 @@ def left_at_bodies(
         touch.take(number, point.walls, point.at_body, point.left_walls)
         at_body, robots = at_body or point.at_body, robots | dict.fromkeys(point.robots)
         if point.walls:
-            if latest >= 0:
+            if latest >= 0 and not _is_again(points[latest], point, radius_m):
                 other_wall = stretch_of.get(latest) is None or stretch_of.get(latest) is not stretch_of.get(number)
                 answers = ((),) if at_body and touch.since > latest else tuple((each,) for each in robots if other_wall)
                 aside = tuple(_seen_aside(points[latest], point))
@@ -111,6 +119,16 @@ def left_at_bodies(
                     found[each] = found.get(each, ()) + tuple((*robot, *aside) for robot in answers)
             latest, at_body, robots = number, point.at_body, dict.fromkeys(point.robots)
     return found
+
+
+def _is_again(before: WalkPoint, point: WalkPoint, radius_m: float) -> bool:
+    """Return whether a body in touch with a wall at two points touches it at almost the same place."""
+    return any(
+        angle_between(a, b) < SAME_WALL_RAD
+        and math.dist(touched_point(before.at, a, radius_m), touched_point(point.at, b, radius_m)) < 2.0 * radius_m
+        for a in before.walls
+        for b in point.walls
+    )
 
 
 def _seen_aside(before: WalkPoint, point: WalkPoint) -> Iterator[int]:

@@ -190,7 +190,7 @@ def test_a_robot_that_leaves_a_wall_at_a_body_may_have_passed_an_opening(
 ) -> None:
     other = point(_0=30)._replace(walls=(math.pi,) if between else SOUTH)
     walk = Walk(0, -1, (point(_0=10), point(_0=20), *between, other, point(_0=50)))
-    assert left_at_bodies(walk.points, stretches_of(walk)) == left
+    assert left_at_bodies(walk.points, stretches_of(walk), 0.07) == left
 
 
 @pytest.mark.parametrize(("beyond_deg", "answers"), [(80, ()), (60, (1,))])
@@ -200,7 +200,18 @@ def test_a_slot_that_saw_both_walls_beside_each_other_answers_for_a_body_between
     """It is open between the two, by itself. From slot 0 they are in one direction."""
     other = point(_0=30, _1=beyond_deg)._replace(walls=(math.pi,))
     walk = Walk(0, -1, (point(_0=10, _1=100), point(_0=20, _1=90), AT_BODY, other))
-    assert left_at_bodies(walk.points, stretches_of(walk)) == {1: (answers,), 3: (answers,)}
+    assert left_at_bodies(walk.points, stretches_of(walk), 0.07) == {1: (answers,), 3: (answers,)}
+
+
+@pytest.mark.parametrize(("further_m", "left"), [(0.1, {}), (-0.1, {}), (0.2, {0: ((),), 2: ((),)})])
+def test_no_opening_is_between_two_places_of_a_wall_that_are_closer_than_a_body(
+    further_m: float, left: dict[int, tuple[tuple[int, ...], ...]]
+) -> None:
+    """A robot that pushed a body along the wall left the wall beside it, and came to the same wall again."""
+    before, after = point(_0=10)._replace(at=(1.0, 0.5)), point(_0=20)._replace(at=(1.0 + further_m, 0.5))
+    walk = Walk(0, -1, (before, AT_BODY, after._replace(walls=(math.radians(-95.0),))))
+    assert left_at_bodies(walk.points, stretches_of(walk), 0.07) == left
+    assert left_at_bodies(walk.points, stretches_of(walk), 0.0) == {0: ((),), 2: ((),)}
 
 
 @pytest.mark.parametrize(("between", "opened"), [(AT_BODY, [(245, 255), (330, 150)]), (None, [(330, 150)])])
