@@ -194,6 +194,21 @@ def test_a_body_that_the_robot_does_not_turn_round_is_no_wall() -> None:
     assert [point.robots for point in points[1:4]] == [(BODY,)] * 3
 
 
+@pytest.mark.parametrize(
+    ("other_deg", "is_wall"),
+    [
+        pytest.param(-25.0, True, id="an acute corner of 65 degrees"),
+        pytest.param(-90.0, False, id="the other side of a passage"),
+        pytest.param(90.0, False, id="the same wall"),
+        pytest.param(45.0, False, id="the body is not beside the other wall"),
+    ],
+)
+def test_a_body_in_an_acute_corner_counts_as_wall(other_deg: float, is_wall: bool) -> None:
+    """The direction to it turns by 45 degrees from push to push, between walls that it leans on."""
+    touches: list[Touch] = [((None, 90.0),), ((BODY, 0.0),), ((BODY, 26.0),), ((BODY, 45.0),), ((None, other_deg),)]
+    assert [bool(point.touched) for point in reported(touches)] == [True, is_wall, is_wall, is_wall, True]
+
+
 def test_a_body_that_yields_on_the_way_round_is_no_wall() -> None:
     """The robot has pushed it to another place: there may be a way where it was."""
     points = reported(body_from(0.0, -90.0), yields=(2,))

@@ -39,6 +39,13 @@ APART_TICKS: Final = 2
 # Bodies count as wall if the direction to them turned by this [rad] at least from one wall to the next. A robot turns round
 # by less than 35 degrees in front of a body in a bend that it cannot pass.
 ROUND_RAD: Final = math.radians(60.0)
+# In an acute corner they turn by less, and the pushes show less than that. There this angle [rad] is enough: the directions of
+# the two walls differ by these angles [rad], while those on the two sides of a passage are opposite, as the switches show them,
+# and the body leans on both walls, which are at right angles to its direction, within the last angle [rad].
+ROUND_IN_CORNER_RAD: Final = math.radians(35.0)
+CORNER_RAD_MIN: Final = math.radians(30.0)
+CORNER_RAD_MAX: Final = math.radians(140.0)
+LEANS_RAD: Final = math.radians(45.0)
 # Points at bodies that are held back at most.
 HELD_MAX: Final = 200
 
@@ -198,6 +205,7 @@ class HeldPoints:
         self._held: list[tuple[Waypoint, tuple[float, ...]]] = []
         self._firm: list[tuple[float, ...]] = []  # directions [rad] of bodies that did not yield
         self._at = 0.0, 0.0  # where the robot touched one of these last [m]
+        self._walls: tuple[float, ...] = ()  # directions [rad] of the walls touched last without a body
 
     def take(self, point: Waypoint) -> None:
         """Take in a point, at which the robot is now."""
@@ -213,13 +221,24 @@ class HeldPoints:
             if len(self._held) > HELD_MAX:
                 self.end()
             return
-        ends = self._firm[:1] and (self._firm[0], self._firm[-1])
-        self._release(bool(ends) and min(angle_between(a, b) for a in ends[0] for b in ends[1]) >= ROUND_RAD)
+        self._release(self._is_round(point.touched))
+        self._walls = point.touched or self._walls
         self._report(point)
 
     def end(self) -> None:
         """Report the points that are held back: the bodies there are no wall."""
         self._release(False)
+
+    def _is_round(self, walls: tuple[float, ...]) -> bool:
+        """Return whether the robot turned round bodies that did not yield, to walls in some directions [rad]."""
+        if not self._firm:
+            return False
+        first, last = self._firm[0], self._firm[-1]
+        turned_rad = min(angle_between(a, b) for a in first for b in last)
+        corner = [angle_between(a, b) for a in self._walls for b in walls]
+        leans = _at_right_angles(self._walls, first) and _at_right_angles(walls, last)
+        in_corner = leans and CORNER_RAD_MIN <= min(corner) and max(corner) <= CORNER_RAD_MAX
+        return turned_rad >= (ROUND_IN_CORNER_RAD if in_corner else ROUND_RAD)
 
     def _release(self, at_walls: bool) -> None:
         held, self._held, self._firm = self._held, [], []
@@ -228,3 +247,9 @@ class HeldPoints:
                 robots = tuple(each for each in point.robots if not self._bodies.is_body(each))
                 point = msgspec.structs.replace(point, touched=point.touched or firm, robots=robots)
             self._report(point)
+
+
+def _at_right_angles(walls: Collection[float], bodies: Collection[float]) -> bool:
+    """Return whether there are walls in touch, and all are beside all bodies in touch: directions [rad] to both."""
+    off = [abs(angle_between(a, b) - math.pi / 2.0) for a in walls for b in bodies]
+    return bool(off) and max(off) <= LEANS_RAD
