@@ -237,7 +237,7 @@ class HeldPoints:
         turned_rad = min(angle_between(a, b) for a in first for b in last)
         corner = [angle_between(a, b) for a in self._walls for b in walls]
         leans = _at_right_angles(self._walls, first) and _at_right_angles(walls, last)
-        in_corner = leans and CORNER_RAD_MIN <= min(corner) and max(corner) <= CORNER_RAD_MAX
+        in_corner = leans and min(corner) >= CORNER_RAD_MIN and max(corner) <= CORNER_RAD_MAX
         return turned_rad >= (ROUND_IN_CORNER_RAD if in_corner else ROUND_RAD)
 
     def _release(self, at_walls: bool) -> None:
