@@ -16,8 +16,7 @@ from zwerm.agents.sensor_coverage.motion.walls.dead_bodies import (
     DeadBodies,
     HeldPoints,
 )
-from zwerm.agents.sensor_coverage.motion.walls.near_arcs import NearPoint, NearWay
-from zwerm.agents.sensor_coverage.motion.walls.near_points import NearPoints
+from zwerm.agents.sensor_coverage.motion.walls.near_arcs import NearPoint, NearPoints, NearWay
 from zwerm.wire.messages import BodyVelocity
 
 BODY, OTHER = 9, 4

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.directions import angle_between
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStretch, Pocket, StretchEnd, touched_point
@@ -16,9 +16,6 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     WalkPoint,
     point_before,
 )
-
-# A slot sees two walls beside each other if their directions differ by this [rad]: what is between them is open there.
-ASIDE_RAD: Final = math.radians(15.0)
 
 
 class Passed(NamedTuple):
@@ -101,9 +98,8 @@ def left_at_bodies(
     """Return the numbers of the points of a walk between which the robot left a wall at a body, and came to another one.
 
     Between them may be an opening that the body fills. A slot that looks along it sees both walls in one direction. Each
-    robot that stood there at a slot answers for it: its slot begins a tuple of its own. No robot begins the tuple of a body.
-    Slots that saw both walls, one beside the other, answer for it, too: they are open between the two. No opening is between
-    two points of a wall that are closer to each other than a body of `radius_m` [m] is wide.
+    robot that stood there at a slot answers for it: its slot is in a tuple of its own. The tuple of a body is empty. No
+    opening is between two points of a wall that are closer to each other than a body of `radius_m` [m] is wide.
     """
     touch, found = TouchCounter(), dict[int, tuple[tuple[int, ...], ...]]()
     latest, at_body, robots = -1, False, dict[int, None]()
@@ -114,9 +110,8 @@ def left_at_bodies(
             if latest >= 0 and not _is_again(points[latest], point, radius_m):
                 other_wall = stretch_of.get(latest) is None or stretch_of.get(latest) is not stretch_of.get(number)
                 answers = ((),) if at_body and touch.since > latest else tuple((each,) for each in robots if other_wall)
-                aside = tuple(_seen_aside(points[latest], point))
                 for each in (latest, number) if answers else ():
-                    found[each] = found.get(each, ()) + tuple((*robot, *aside) for robot in answers)
+                    found[each] = found.get(each, ()) + answers
             latest, at_body, robots = number, point.at_body, dict.fromkeys(point.robots)
     return found
 
@@ -129,10 +124,3 @@ def _is_again(before: WalkPoint, point: WalkPoint, radius_m: float) -> bool:
         for a in before.walls
         for b in point.walls
     )
-
-
-def _seen_aside(before: WalkPoint, point: WalkPoint) -> Iterator[int]:
-    """Yield the slots that saw two points of a walk one beside the other."""
-    for slot, direction in before.seen.items():
-        if slot in point.seen and angle_between(direction, point.seen[slot]) > ASIDE_RAD:
-            yield slot

@@ -1,7 +1,8 @@
 """The arcs around a slot that its robot closes when it leaves the slot along a wall close to it, by odometry."""
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import chain, combinations, dropwhile, pairwise
 from typing import Final, NamedTuple
 
@@ -115,6 +116,31 @@ class NearWay:
         return list(
             dropwhile(lambda each: math.dist((each.x_m, each.y_m), self._start) < self._radius_m, self.waypoints)
         )
+
+
+class NearPoints:
+    """The points of a way, passed on to it in their order as soon as it is known what they are in touch with.
+
+    Whether a body of a dead robot counts as wall is known only when walls alone are in touch again (`dead_bodies`). So a
+    point at a body waits until then, as the waypoint at the same place does.
+    """
+
+    def __init__(self, way: NearWay, report: Callable[[Waypoint], None]) -> None:
+        self._way = way
+        self._report = report
+        self._waiting: deque[tuple[NearPoint, Waypoint, bool]] = deque()
+
+    def expect(self, near: NearPoint, point: Waypoint, at_other: bool) -> None:
+        """Note a point, and the waypoint at which it is; `at_other` if a robot that is no body is in touch there."""
+        self._waiting.append((near, point, at_other))
+
+    def take(self, point: Waypoint) -> None:
+        """Take in the next waypoint, and report it. Where it is not the same as before, the bodies count as wall."""
+        near, before, at_other = self._waiting.popleft()
+        if (point.touched, point.robots) != (before.touched, before.robots):
+            near = near._replace(walls=point.touched, at_body=False, at_robot=at_other)
+        self._way.take(near)
+        self._report(point)
 
 
 class _Stretch(NamedTuple):

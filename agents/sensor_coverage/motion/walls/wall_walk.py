@@ -15,8 +15,7 @@ from zwerm.agents.sensor_coverage.messages.commands import LOST, MET, OPEN, SHUT
 from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
 from zwerm.agents.sensor_coverage.motion.locomotion import Locomotion
 from zwerm.agents.sensor_coverage.motion.walls.dead_bodies import DeadBodies, HeldPoints
-from zwerm.agents.sensor_coverage.motion.walls.near_arcs import NearPoint, NearWay, start_in_sight
-from zwerm.agents.sensor_coverage.motion.walls.near_points import NearPoints
+from zwerm.agents.sensor_coverage.motion.walls.near_arcs import NearPoint, NearPoints, NearWay, start_in_sight
 from zwerm.agents.sensor_coverage.motion.walls.past_edge import EDGE_M_MAX, past_edge
 from zwerm.agents.sensor_coverage.motion.walls.touched_robots import RobotsInReach, TouchedRobots
 from zwerm.agents.sensor_coverage.motion.walls.wall_heading import hand_on_wall

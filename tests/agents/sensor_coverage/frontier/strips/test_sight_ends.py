@@ -193,16 +193,6 @@ def test_a_robot_that_leaves_a_wall_at_a_body_may_have_passed_an_opening(
     assert left_at_bodies(walk.points, stretches_of(walk), 0.07) == left
 
 
-@pytest.mark.parametrize(("beyond_deg", "answers"), [(80, ()), (60, (1,))])
-def test_a_slot_that_saw_both_walls_beside_each_other_answers_for_a_body_between_them(
-    beyond_deg: int, answers: tuple[int, ...]
-) -> None:
-    """It is open between the two, by itself. From slot 0 they are in one direction."""
-    other = point(_0=30, _1=beyond_deg)._replace(walls=(math.pi,))
-    walk = Walk(0, -1, (point(_0=10, _1=100), point(_0=20, _1=90), AT_BODY, other))
-    assert left_at_bodies(walk.points, stretches_of(walk), 0.07) == {1: (answers,), 3: (answers,)}
-
-
 @pytest.mark.parametrize(("further_m", "left"), [(0.1, {}), (-0.1, {}), (0.2, {0: ((),), 2: ((),)})])
 def test_no_opening_is_between_two_places_of_a_wall_that_are_closer_than_a_body(
     further_m: float, left: dict[int, tuple[tuple[int, ...], ...]]
