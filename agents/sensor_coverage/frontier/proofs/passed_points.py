@@ -98,8 +98,8 @@ def left_at_bodies(
     """Return the numbers of the points of a walk between which the robot left a wall at a body, and came to another one.
 
     Between them may be an opening that the body fills. A slot that looks along it sees both walls in one direction. Each
-    robot that stood there at a slot answers for it: its slot is in a tuple of its own. The tuple of a body is empty. No
-    opening is between two points of a wall that are closer to each other than a body of `radius_m` [m] is wide.
+    robot that stood there at a slot answers for it: its slot is in a tuple of its own. The tuple of a body is empty. A
+    body that a robot pushes on fills no opening between two points that are closer than its diameter: 2 `radius_m` [m].
     """
     touch, found = TouchCounter(), dict[int, tuple[tuple[int, ...], ...]]()
     latest, at_body, robots = -1, False, dict[int, None]()
@@ -107,7 +107,7 @@ def left_at_bodies(
         touch.take(number, point.walls, point.at_body, point.left_walls)
         at_body, robots = at_body or point.at_body, robots | dict.fromkeys(point.robots)
         if point.walls:
-            if latest >= 0 and not _is_again(points[latest], point, radius_m):
+            if latest >= 0 and not (at_body and _is_again(points[latest], point, radius_m)):
                 other_wall = stretch_of.get(latest) is None or stretch_of.get(latest) is not stretch_of.get(number)
                 answers = ((),) if at_body and touch.since > latest else tuple((each,) for each in robots if other_wall)
                 for each in (latest, number) if answers else ():
