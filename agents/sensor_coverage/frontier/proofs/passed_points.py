@@ -51,9 +51,9 @@ def passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
     touch = TouchCounter()
     stretch_of = stretches_of(walk)
     stretches = list({each.first_number: each for each in stretch_of.values()}.values())
+    at_bodies = left_at_bodies(walk.points, stretch_of, walk.radius_m)
     # No other slot relies on what the origin saw: that counts while its robot stands there.
     others = walk.points if walk.origin is None else [each.unseen_by((walk.origin.slot,)) for each in walk.points]
-    at_bodies = left_at_bodies(others, stretch_of, walk.radius_m)
     for number, point in enumerate(walk.points):
         touch.take(number, point.walls, point.at_body, point.left_walls)
         if point.is_blind:

@@ -7,7 +7,8 @@ direction. When the direction has turned, the robot pushes again. A robot that p
 Beyond a body that does not yield may still be a way: a body that lies in a bend of a passage narrower than two bodies
 yields to no push from one end, and the robot turns round in front of it. Around a body in the corner of a room the direction to
 the body turns by as much as the angle of the corner. So the points of the walk at bodies are held back until walls alone
-are in touch again. The bodies count only if their direction turned by `ROUND_RAD` and they did not yield meanwhile.
+are in touch again. The bodies count only if their direction turned by `ROUND_RAD`, or by `ROUND_IN_CORNER_RAD` between the
+walls of a corner on which they lean, and if they did not yield meanwhile.
 """
 
 import math

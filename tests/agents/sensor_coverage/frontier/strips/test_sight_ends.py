@@ -188,7 +188,7 @@ def test_a_slot_that_saw_the_next_point_counts_for_a_dark_edge_also_if_the_walk_
 def test_a_robot_that_leaves_a_wall_at_a_body_may_have_passed_an_opening(
     between: tuple[WalkPoint, ...], left: dict[int, tuple[tuple[int, ...], ...]]
 ) -> None:
-    other = point(_0=30)._replace(walls=(math.pi,) if between else SOUTH)
+    other = point(_0=40)._replace(walls=(math.pi,) if between else SOUTH)
     walk = Walk(0, -1, (point(_0=10), point(_0=20), *between, other, point(_0=50)))
     assert left_at_bodies(walk.points, stretches_of(walk), 0.07) == left
 
