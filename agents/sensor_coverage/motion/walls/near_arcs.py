@@ -126,7 +126,7 @@ class NearPoints:
     """
 
     def __init__(self, way: NearWay, report: Callable[[Waypoint], None]) -> None:
-        self._way = way
+        self.way = way
         self._report = report
         self._waiting: deque[tuple[NearPoint, Waypoint, bool]] = deque()
 
@@ -139,7 +139,7 @@ class NearPoints:
         near, before, at_other = self._waiting.popleft()
         if (point.touched, point.robots) != (before.touched, before.robots):
             near = near._replace(walls=point.touched, at_body=False, at_robot=at_other)
-        self._way.take(near)
+        self.way.take(near)
         self._report(point)
 
 

@@ -77,8 +77,7 @@ class WallWalk:
         self._turned_rad = 0.0  # towards the hand, since a wall was at the hand
         self._latest_wall_rad = 0.0  # the direction of that wall
         self._start = motion.position
-        self._way_near: NearWay | None = None  # while the robot follows a wall close to the start
-        self._near_points: NearPoints | None = None  # those of that way
+        self._near_points: NearPoints | None = None  # while the robot follows a wall close to the start
         self._held_near = self._held_points(self.on_step)
         self._in_reach = RobotsInReach(motion.radius_m)
 
@@ -146,7 +145,7 @@ class WallWalk:
 
     def _begin_near(self, hand: int) -> NearWay:
         """Begin to record the way along a wall from here, close to the start, with the wall at the hand."""
-        way = self._way_near = NearWay(self._start, hand, self.radius_m, self._swept_only)
+        way = NearWay(self._start, hand, self.radius_m, self._swept_only)
         self._held_near = self._held_points(way.waypoints.append, way)
         self._in_reach.begin()
         self._report(self._held_near)
@@ -156,7 +155,6 @@ class WallWalk:
         """End this record, and return the end of the drive."""
         self._held_near.end()
         self._touched.end()
-        self._way_near = None
         return WalkResult(end, driven_m, tuple(first_of_message(way.seen_from_start())), way.walls(), way)
 
     def _held_points(self, report: Callable[[Waypoint], None], near: NearWay | None = None) -> HeldPoints:
@@ -250,7 +248,7 @@ class WallWalk:
             reported.append(point)
             self.on_step(point)
 
-        held, self._way_near = self._held_points(report), None
+        held = self._held_points(report)
         end, way, kept = yield from self._along(hand, length_m, keep, meet, margin_m, held)
         held.end()
         self._touched.end()
@@ -349,7 +347,7 @@ class WallWalk:
         points.expect(near, point, any(not self._bodies.is_body(each.node) for each in beside))
 
     def _waypoint(self) -> Waypoint:
-        frame, near = self._motion.frame, self._way_near
+        frame, near = self._motion.frame, self._near_points
         return Waypoint(
             frame.x_m,
             frame.y_m,
@@ -360,7 +358,7 @@ class WallWalk:
                 for each in frame.contacts
                 if each.node is not None and each.node not in self._in_reach.out_of_reach
             ),
-            None if near is None else start_in_sight(self._start, self._trail, near.hand, self.radius_m),
+            None if near is None else start_in_sight(self._start, self._trail, near.way.hand, self.radius_m),
         )
 
     # --- sight ------------------------------------------------------------------------------------------------------
