@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.directions import angle_between
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStretch, Pocket, StretchEnd, touched_point
@@ -10,12 +10,32 @@ from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import SightEnd, da
 from zwerm.agents.sensor_coverage.frontier.strips.stretches import pockets_beside, stretches_of
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     SAME_WALL_RAD,
+    Arc,
     SeenPoint,
     TouchCounter,
     Walk,
     WalkPoint,
+    arc_between,
     point_before,
 )
+
+# A slot sees two walls beside each other if their directions differ by more than this [rad].
+ASIDE_RAD: Final = math.radians(15.0)
+
+
+class LeftWall(NamedTuple):
+    """A place at which a walking robot left a wall, and came to another one: the slots of the robots that stood there.
+
+    The slots `aside` saw the two walls beside each other. What is open there lies in their arcs between the two.
+    """
+
+    robots: tuple[int, ...]
+    aside: tuple[tuple[int, Arc], ...] = ()
+
+    def end_at(self, slot: int, there: float) -> Iterator[SightEnd]:
+        """Yield the edge of sight of a slot that saw a wall in a direction [rad], and not the other one beside it."""
+        if all(each != slot for each, _ in self.aside):
+            yield SightEnd(there, self.robots, aside=self.aside)
 
 
 class Passed(NamedTuple):
@@ -76,7 +96,7 @@ def passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
             between = between if before is not None else ()
             edges = tuple(sight_ends_at(slot, number, others, walk.end))
             dark = tuple(dark_ends_at(slot, number, walk.points))
-            dark = (*dark, *(SightEnd(point.seen[slot], each) for each in at_bodies.get(number, ())))
+            dark = (*dark, *(end for each in at_bodies.get(number, ()) for end in each.end_at(slot, point.seen[slot])))
             ties = () if here is None else _ties_at(number, here)
             yield (
                 slot,
@@ -94,14 +114,14 @@ def _ties_at(number: int, stretch: FollowedStretch) -> tuple[int, ...]:
 
 def left_at_bodies(
     points: Sequence[WalkPoint], stretch_of: Mapping[int, FollowedStretch], radius_m: float
-) -> dict[int, tuple[tuple[int, ...], ...]]:
+) -> dict[int, tuple[LeftWall, ...]]:
     """Return the numbers of the points of a walk between which the robot left a wall at a body, and came to another one.
 
     Between them may be an opening that the body fills. A slot that looks along it sees both walls in one direction. Each
-    robot that stood there at a slot answers for it: its slot is in a tuple of its own. The tuple of a body is empty. A
-    body that a robot pushes on fills no opening between two points that are closer than its diameter: 2 `radius_m` [m].
+    robot that stood there at a slot answers for it, alone; nobody does so for a body. A body that a robot pushes on fills
+    no opening between two points that are closer than its diameter: 2 `radius_m` [m].
     """
-    touch, found = TouchCounter(), dict[int, tuple[tuple[int, ...], ...]]()
+    touch, found = TouchCounter(), dict[int, tuple[LeftWall, ...]]()
     latest, at_body, robots = -1, False, dict[int, None]()
     for number, point in enumerate(points):
         touch.take(number, point.walls, point.at_body, point.left_walls)
@@ -110,8 +130,9 @@ def left_at_bodies(
             if latest >= 0 and not (at_body and _is_again(points[latest], point, radius_m)):
                 other_wall = stretch_of.get(latest) is None or stretch_of.get(latest) is not stretch_of.get(number)
                 answers = ((),) if at_body and touch.since > latest else tuple((each,) for each in robots if other_wall)
+                aside = tuple(_seen_aside(points[latest], point))
                 for each in (latest, number) if answers else ():
-                    found[each] = found.get(each, ()) + answers
+                    found[each] = found.get(each, ()) + tuple(LeftWall(robot, aside) for robot in answers)
             latest, at_body, robots = number, point.at_body, dict.fromkeys(point.robots)
     return found
 
@@ -124,3 +145,10 @@ def _is_again(before: WalkPoint, point: WalkPoint, radius_m: float) -> bool:
         for a in before.walls
         for b in point.walls
     )
+
+
+def _seen_aside(before: WalkPoint, point: WalkPoint) -> Iterator[tuple[int, Arc]]:
+    """Yield the slots that saw two points of a walk beside each other, and their arcs between the two."""
+    for slot, there in before.seen.items():
+        if slot in point.seen and angle_between(there, point.seen[slot]) > ASIDE_RAD:
+            yield slot, arc_between(there, point.seen[slot])

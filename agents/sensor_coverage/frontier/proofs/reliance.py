@@ -7,9 +7,10 @@ chain comes back to where it began, nobody has seen the space.
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Final, NamedTuple
 
-from zwerm.agents.sensor_coverage.frontier.wall_proof import GAP_RAD, Arc, complement, contains, shared_arcs
+from zwerm.agents.sensor_coverage.frontier.wall_proof import GAP_RAD, Arc, complement, contains, overlap, shared_arcs
 from zwerm.maths.sums import added
 
 # A slot relies on another one for a gap only if it looks further into it than this [rad]: bearings have noise.
@@ -55,13 +56,33 @@ class Fan(NamedTuple):
         return min(side * (self.from_other - each) % math.tau for each in edges)
 
 
-def circular_gaps(gaps: Mapping[int, Sequence[Arc]], fans: Mapping[int, Iterable[Fan]]) -> dict[int, list[Arc]]:
-    """Return what is left of the gaps of each slot without triangles that rely on gaps which are left themselves."""
+class Answered(NamedTuple):
+    """A gap for which other slots answer, each with an arc of its own: the gap is closed if one of them has no gap there."""
+
+    gap: Arc
+    others: Sequence[tuple[int, Arc]]
+
+    def arcs(self, gaps: Mapping[int, Sequence[Arc]]) -> list[Arc]:
+        """Return the gap if the slots with these gaps close it."""
+        closed = any(all(overlap(arc, gap) <= GAP_RAD for gap in gaps.get(slot, ())) for slot, arc in self.others)
+        return [self.gap] if closed else []
+
+
+def circular_gaps(
+    gaps: Mapping[int, Sequence[Arc]],
+    fans: Mapping[int, Iterable[Fan]],
+    answered: Mapping[int, Sequence[Answered]] = MappingProxyType({}),
+) -> dict[int, list[Arc]]:
+    """Return what is left of the gaps of each slot without triangles that rely on gaps which are left themselves.
+
+    So it is with gaps for which other slots answer.
+    """
     left = {slot: list(each) for slot, each in gaps.items() if each}
     while True:
         before, left = left, {}
         for slot, opened in before.items():
             closed = [arc for fan in fans.get(slot, ()) for arc in fan.arcs(before.get(fan.other, ()))]
+            closed += [arc for each in answered.get(slot, ()) for arc in each.arcs(before)]
             free = complement(closed)
             parts = (part for gap in opened for each in free for part in shared_arcs(gap, each))
             if rest := [each for each in parts if each.width_rad > GAP_RAD]:

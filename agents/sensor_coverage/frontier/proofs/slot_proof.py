@@ -356,7 +356,7 @@ class SlotProof:
     def edges(self) -> tuple[LostSight, ...]:
         """Return the edges of sight, for the slot's next occupant: the latest ones, as far as they name few slots."""
         latest = list(self._edges)[-EDGES_MAX:]
-        return tuple((there, saw[:EDGE_SLOTS_MAX], seen[:EDGE_SLOTS_MAX]) for there, saw, seen in latest)
+        return tuple((there, saw[:EDGE_SLOTS_MAX], seen[:EDGE_SLOTS_MAX]) for there, saw, seen, _ in latest)
 
     def memory(self) -> tuple[ProvedArc, ...]:
         """Return the arcs that walks closed, for the slot's next occupant: of many those that rely on few slots."""

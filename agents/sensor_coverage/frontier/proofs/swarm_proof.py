@@ -30,6 +30,7 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     contains,
     ends_at,
     overlap,
+    shared_arcs,
     united,
 )
 from zwerm.maths.sums import added
@@ -102,8 +103,7 @@ class SwarmProof:
             if seen.get(slot) != beside:
                 self._versions[slot] = self._versions.get(slot, 0) + 1
             robots = [each for each in in_touch.get(slot, ()) if each in beside]
-            passed = len(self._passed.get(slot, ()))
-            robot = self._robots.get(slot)
+            passed, robot = len(self._passed.get(slot, ())), self._robots.get(slot)
             now = ArcBasis(passed, beside, touched.get(slot, ()), tuple(near.get(slot, ())), robots, robot)
             if self._around.get(slot) != now:
                 self._around[slot] = now
@@ -123,7 +123,17 @@ class SwarmProof:
     def _circular(self) -> dict[int, list[Arc]]:
         """Return the gaps that slots close by relying on each other in a circle."""
         gaps = {slot: complement(self._closed_without_fans(slot)) for slot in self._around}
-        return circular_gaps(gaps, {slot: list(self._fans(slot)) for slot, each in gaps.items() if each})
+        answered = {slot: each.answered for slot, each in self._wall_arcs.items() if each.answered}
+        for slot, each in ((slot, each) for slot, several in answered.items() for each in several):
+            for other, arc in ((slot, each.gap), *each.others):
+                gaps[other] = united([*gaps[other], *self._beside_edges(other, arc)])
+        return circular_gaps(gaps, {slot: list(self._fans(slot)) for slot, each in gaps.items() if each}, answered)
+
+    def _beside_edges(self, slot: int, arc: Arc) -> Iterator[Arc]:
+        """Yield the parts of an arc of a slot that walls do not close, if no other slot answers for edges of sight."""
+        contacts = arcs_of_walls(self._around[slot].touched) if slot in self._bases else ()
+        for each in complement([*self._wall_arcs[slot].strict, *contacts, *self._by_robots.all(slot)]):
+            yield from shared_arcs(each, arc)
 
     def _fans(self, slot: int) -> Iterator[Fan]:
         """Yield the triangles with points that count at a slot."""
@@ -159,8 +169,8 @@ class SwarmProof:
                 self._triangles.add(slot, passed.number, passed.stretch, len(self._points), passed.point)
                 self._triangles.add_tied(slot, passed.point, passed.ties)
                 ends = (*passed.ends, *(pocket.other for _, pocket in passed.pockets))
-                witnesses = (each.witnesses for each in (*passed.sight_ends, *passed.dark_ends))
-                relied = (*passed.between, *(each.ties for each in ends), *witnesses)
+                answering = (each.answering for each in (*passed.sight_ends, *passed.dark_ends))
+                relied = (*passed.between, *(each.ties for each in ends), *answering)
                 for each in dict.fromkeys(each for witnesses in relied for each in witnesses):
                     self._witnessed.setdefault(each, {})[slot] = None
             self._origins.add(len(self._points), walk)
@@ -358,8 +368,8 @@ class SwarmProof:
             return False
         known = self._alone.get((slot, other))
         if known is None:
-            edged = self._wall_arcs[slot].edged if slot in self._wall_arcs else ()
-            closed = *edged, *arcs_of_walls(self._around[slot].touched), *self._by_robots.between(slot, (other,))
+            walls = self._wall_arcs[slot].strict if slot in self._wall_arcs else ()
+            closed = *walls, *arcs_of_walls(self._around[slot].touched), *self._by_robots.between(slot, (other,))
             known = self._alone[slot, other] = united(closed)
         return contains(known, Arc(there, 0.0))
 

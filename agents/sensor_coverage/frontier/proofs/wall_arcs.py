@@ -1,10 +1,11 @@
 """The arcs of a slot that end at followed walls or at contacts, by what the slot saw of walks and touches itself."""
 
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.proofs.passed_points import Passed
+from zwerm.agents.sensor_coverage.frontier.proofs.reliance import Answered
 from zwerm.agents.sensor_coverage.frontier.strips.crossings import (
     arcs_beside_pocket,
     crossings_of_pocket,
@@ -12,7 +13,7 @@ from zwerm.agents.sensor_coverage.frontier.strips.crossings import (
 )
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import Pocket
 from zwerm.agents.sensor_coverage.frontier.strips.robots_in_touch import BODY_RAD
-from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import SightEnd, edged_arcs, shortened
+from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import SightEnd, beside_edge, edged_arcs, shortened
 from zwerm.agents.sensor_coverage.frontier.strips.way_begins import between_begins
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     CONTACT_RAD,
@@ -43,16 +44,21 @@ class ArcBasis(NamedTuple):
 
 
 class WallArcs(NamedTuple):
-    """Disjoint arcs of a slot that end at followed walls or at contacts; the same without edges of sight, and by stretch."""
+    """Disjoint arcs of a slot that end at followed walls or at contacts; the same without edges of sight, and by stretch.
+
+    `strict` are those without edges for which slots answer that saw them from the side, and `answered` has these.
+    """
 
     followed: list[Arc]
     edged: list[Arc]
     by_stretch: dict[int, list[Arc]]
+    strict: list[Arc]
+    answered: list[Answered]
 
     def lies_at(self, there: float, stretch: int, near: Iterable[Arc]) -> bool:
         """Return whether a direction [rad] is closed, and a `stretch` of wall or one of walls `near` goes on there."""
         beside = Arc(there - SEEN_RAD, 2.0 * SEEN_RAD)
-        return contains(self.edged, Arc(there, 0.0)) and (
+        return contains(self.strict, Arc(there, 0.0)) and (
             contains(united(self.by_stretch.get(stretch, ())), beside) or contains(near, beside)
         )
 
@@ -64,7 +70,7 @@ class WallArcs(NamedTuple):
         turn = math.remainder(to_point - to_slot, math.tau)
         width = math.pi - abs(turn) + BODY_RAD
         beyond = Arc(to_point - BODY_RAD if turn > 0.0 else to_point + BODY_RAD - width, width)
-        return not any(overlap(each, beyond) > 0.0 for each in complement(self.edged))
+        return not any(overlap(each, beyond) > 0.0 for each in complement(self.strict))
 
 
 class StepCrossings:
@@ -106,12 +112,15 @@ def find_wall_arcs(
     beside: dict[tuple[int, bool], tuple[int, Pocket]] = {}  # by stretch and end, with the hand
     edges: dict[int, list[SightEnd]] = {}
     dark: dict[int, list[SightEnd]] = {}
+    aside: dict[int, list[SightEnd]] = {}
     for passed in points:
         hand, stretch = passed.hand, passed.stretch
         if all(any(each in standing for each in witnesses) for witnesses in passed.between):
             crossings.setdefault(stretch, []).extend(crossings_of(passed, standing))
         edges.setdefault(stretch, []).extend(each for each in passed.sight_ends if each.is_loose(standing))
-        dark.setdefault(stretch, []).extend(each for each in passed.dark_ends if each.is_loose(standing))
+        for each in passed.dark_ends:
+            if not each.is_seen(standing):
+                (dark if each.is_loose(standing) else aside).setdefault(stretch, []).append(each)
         for first_number, pocket in passed.pockets:
             contacts += arcs_beside_pocket(hand, pocket, touched_by(pocket.robot))
             if pocket.in_touch or (first_number, pocket.is_last) not in beside:
@@ -121,6 +130,19 @@ def find_wall_arcs(
         crossings.setdefault(first_number, []).extend(crossings_of_pocket(hand, pocket, is_loose))
     near = between_begins(basis.near)
     by_stretch = {number: arcs_into(each) for number, each in crossings.items()}
-    edged = edged_arcs(by_stretch, edges, contacts, shortened(near), dark)
+    edged = strict = edged_arcs(by_stretch, edges, contacts, shortened(near), dark)
+    if aside:
+        loose = {each: [*dark.get(each, ()), *aside.get(each, ())] for each in (*dark, *aside)}
+        strict = edged_arcs(by_stretch, edges, contacts, shortened(near), loose)
     found = (*contacts, *(each.arc for each in near), *(arc for each in by_stretch.values() for arc in each))
-    return WallArcs(united(found), edged, by_stretch)
+    return WallArcs(united(found), edged, by_stretch, strict, list(_answered(by_stretch, aside, standing)))
+
+
+def _answered(
+    by_stretch: Mapping[int, Sequence[Arc]], aside: Mapping[int, Sequence[SightEnd]], standing: Collection[int]
+) -> Iterator[Answered]:
+    """Yield the directions beside edges of sight for which other slots answer."""
+    for stretch, ends in aside.items():
+        whole = united(by_stretch.get(stretch, ()))
+        for each in ends:
+            yield Answered(beside_edge(each, whole), [other for other in each.aside if other[0] in standing])

@@ -35,12 +35,14 @@ SAME_EDGE_RAD: Final = math.radians(1.0)
 class SightEnd(NamedTuple):
     """The direction [rad] in which a slot lost sight of a walk, or saw it first, and the slots that saw what is beyond.
 
-    Where each slot keeps its own proof, the other slots `seen` saw the walk in this direction.
+    Where each slot keeps its own proof, the other slots `seen` saw the walk in this direction. The slots `aside` saw the two
+    sides of what may be open there, one beside the other: it lies in their arcs, and they close these (`reliance`).
     """
 
     direction_rad: float
     witnesses: tuple[int, ...]
     seen: tuple[int, ...] = ()
+    aside: tuple[tuple[int, Arc], ...] = ()
 
     def without(self, slots: Collection[int]) -> "SightEnd | None":
         """Return the edge when these slots are lost: None if one of them saw the walk there."""
@@ -48,9 +50,18 @@ class SightEnd(NamedTuple):
             return None
         return self._replace(witnesses=tuple(each for each in self.witnesses if each not in slots))
 
+    @property
+    def answering(self) -> tuple[int, ...]:
+        """The slots that answer for what is beyond."""
+        return (*self.witnesses, *(each for each, _ in self.aside))
+
     def is_loose(self, standing: Collection[int]) -> bool:
-        """Return whether no standing robot saw the walk beyond."""
-        return not any(each in standing for each in self.witnesses)
+        """Return whether no standing robot saw the walk beyond, or what is open there from the side."""
+        return not any(each in standing for each in self.answering)
+
+    def is_seen(self, standing: Collection[int]) -> bool:
+        """Return whether a standing robot saw the walk beyond."""
+        return any(each in standing for each in self.witnesses)
 
 
 def sight_ends_at(slot: int, number: int, points: Sequence[WalkPoint], end: int | None = None) -> Iterator[SightEnd]:

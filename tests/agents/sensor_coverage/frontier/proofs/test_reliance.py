@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from zwerm.agents.sensor_coverage.frontier.proofs.reliance import Fan, circular_gaps
+from zwerm.agents.sensor_coverage.frontier.proofs.reliance import Answered, Fan, circular_gaps
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc
 
 
@@ -73,3 +73,30 @@ def test_a_slot_that_sees_another_one_between_two_robots_leaves_what_is_behind_t
     assert circular_gaps(gap, {3: [past]}) == {}
     left = circular_gaps(gap, {3: [past._replace(beyond=[arc(11.8, 89)])]})
     assert degrees(left) == {3: [(24, 95)]}
+
+
+@pytest.mark.parametrize(
+    ("others", "open_deg"),
+    [
+        pytest.param([(1, arc(30, 60))], [], id="it closes what is there"),
+        pytest.param([(1, arc(60, 90))], [(40, 50)], id="it has a gap there"),
+        pytest.param([(1, arc(60, 90)), (2, arc(0, 40))], [], id="one of two"),
+        pytest.param([(0, arc(30, 60))], [(40, 50)], id="the slot itself has the gap"),
+        pytest.param([], [(40, 50)], id="none"),
+    ],
+)
+def test_another_slot_answers_for_a_gap_if_it_has_none_there(
+    others: list[tuple[int, Arc]], open_deg: list[tuple[int, int]]
+) -> None:
+    gaps = {0: [arc(40, 50)], 1: [arc(80, 100)], 2: []}
+    left = circular_gaps(gaps, {}, {0: [Answered(arc(40, 50), others)]})
+    assert degrees({0: left.get(0, [])}) == {0: open_deg}
+
+
+def test_slots_that_answer_for_each_other_leave_their_gaps_open() -> None:
+    """The second slot closes what it answers for by a triangle that relies on the first."""
+    gaps = {0: [arc(165, 175)], 1: [arc(80, 100)]}
+    answered = {0: [Answered(arc(165, 175), [(1, arc(60, 90))])]}
+    behind, clear = fan(0, 60.0, 120.0, 170.0), fan(2, 60.0, 120.0, 170.0)
+    assert degrees(circular_gaps(gaps, {1: [behind]}, answered)) == {0: [(165, 175)], 1: [(80, 100)]}
+    assert circular_gaps(gaps, {1: [clear]}, answered) == {}, "negative control: slot 2 has no gap"

@@ -26,4 +26,4 @@ def test_walls_close_what_is_beyond_a_triangle_with_a_point_beside_the_robot(
 ) -> None:
     """The other slot is in the direction 0. Rays from there go past the point, up to the opposite direction."""
     edged = Arc(math.radians(walls[0]), math.radians(walls[1] - walls[0]))
-    assert WallArcs([], [edged], {}).close_beyond(0.0, math.radians(point)) is closes
+    assert WallArcs([], [], {}, [edged], []).close_beyond(0.0, math.radians(point)) is closes

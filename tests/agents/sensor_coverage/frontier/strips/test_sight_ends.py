@@ -5,7 +5,7 @@ import math
 import pytest
 
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
-from zwerm.agents.sensor_coverage.frontier.proofs.passed_points import left_at_bodies
+from zwerm.agents.sensor_coverage.frontier.proofs.passed_points import LeftWall, left_at_bodies
 from zwerm.agents.sensor_coverage.frontier.proofs.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import (
     SightEnd,
@@ -51,6 +51,8 @@ BEFORE = point(_0=150), point(_0=200), point(_0=250)
 BEYOND = point(_0=250), point(_0=290), point(_0=330)
 AT_ROBOT = WalkPoint({0: math.radians(250)}, (), (7,))
 AT_BODY = WalkPoint({0: math.radians(250)}, (), (), at_body=True)
+BODY = LeftWall(())
+TWO_ROBOTS = LeftWall((7,)), LeftWall((8,))
 
 
 @pytest.mark.parametrize(
@@ -176,32 +178,67 @@ def test_a_slot_that_saw_the_next_point_counts_for_a_dark_edge_also_if_the_walk_
     ("between", "left"),
     [
         pytest.param((), {}, id="the same wall"),
-        pytest.param((AT_BODY,), {1: ((),), 3: ((),)}, id="a body, then another wall"),
-        pytest.param((AT_BODY, AT_BODY, AT_BODY, AT_BODY), {1: ((),), 6: ((),)}, id="a long way round a body"),
+        pytest.param((AT_BODY,), {1: (BODY,), 3: (BODY,)}, id="a body, then another wall"),
+        pytest.param((AT_BODY, AT_BODY, AT_BODY, AT_BODY), {1: (BODY,), 6: (BODY,)}, id="a long way round a body"),
         pytest.param((point()._replace(walls=()),), {}, id="a corner"),
         pytest.param(
-            (AT_ROBOT,), {1: ((7,),), 3: ((7,),)}, id="a robot at a slot, which answers for what is behind it"
+            (AT_ROBOT,),
+            {1: (LeftWall((7,)),), 3: (LeftWall((7,)),)},
+            id="a robot at a slot, which answers for what is behind it",
         ),
-        pytest.param((AT_ROBOT, AT_ROBOT._replace(robots=(8,))), {1: ((7,), (8,)), 4: ((7,), (8,))}, id="two robots"),
+        pytest.param((AT_ROBOT, AT_ROBOT._replace(robots=(8,))), {1: TWO_ROBOTS, 4: TWO_ROBOTS}, id="two robots"),
     ],
 )
 def test_a_robot_that_leaves_a_wall_at_a_body_may_have_passed_an_opening(
-    between: tuple[WalkPoint, ...], left: dict[int, tuple[tuple[int, ...], ...]]
+    between: tuple[WalkPoint, ...], left: dict[int, tuple[LeftWall, ...]]
 ) -> None:
-    other = point(_0=40)._replace(walls=(math.pi,) if between else SOUTH)
+    other = point(_0=30)._replace(walls=(math.pi,) if between else SOUTH)
     walk = Walk(0, -1, (point(_0=10), point(_0=20), *between, other, point(_0=50)))
     assert left_at_bodies(walk.points, stretches_of(walk), 0.07) == left
 
 
-@pytest.mark.parametrize(("further_m", "left"), [(0.1, {}), (-0.1, {}), (0.2, {0: ((),), 2: ((),)})])
+@pytest.mark.parametrize(("beyond_deg", "aside"), [(80, ()), (60, ((1, arc(60, 90)),))])
+def test_a_slot_that_saw_both_walls_beside_each_other_has_no_edge_of_sight_there(
+    beyond_deg: int, aside: tuple[tuple[int, Arc], ...]
+) -> None:
+    """It is open between the two, by itself, and answers for slot 0, which sees them in one direction."""
+    other = point(_0=30, _1=beyond_deg)._replace(walls=(math.pi,))
+    walk = Walk(0, -1, (point(_0=10, _1=100), point(_0=20, _1=90), AT_BODY, other))
+    (left,) = left_at_bodies(walk.points, stretches_of(walk), 0.07)[1]
+    assert degrees([each for _, each in left.aside]) == degrees([each for _, each in aside])
+    assert [slot for slot in (0, 1) if any(left.end_at(slot, 0.0))] == ([0] if aside else [0, 1])
+
+
+@pytest.mark.parametrize(
+    ("saw", "closed", "opened"),
+    [
+        pytest.param((), arc(0, 360), {0: [(245, 255)]}, id="no slot saw both walls"),
+        pytest.param((90, 60), arc(0, 360), {}, id="slot 1 saw them, and closes what is between them"),
+        pytest.param((90, 60), arc(85, 425), {1: [(65, 85)]}, id="it does not"),
+    ],
+)
+def test_a_slot_answers_for_what_is_between_two_walls_if_it_closes_that(
+    saw: tuple[int, ...], closed: Arc, opened: dict[int, list[tuple[int, int]]]
+) -> None:
+    """Nothing else is open. Slot 1 sees the walls on both sides of a body beside each other, slot 0 in one direction."""
+    beside = [{1: math.radians(each)} for each in saw] or [{}, {}]
+    before = (*BEFORE[:-1], BEFORE[-1]._replace(seen=BEFORE[-1].seen | beside[0]))
+    beyond = (BEYOND[0]._replace(seen=BEYOND[0].seen | beside[1]), *BEYOND[1:])
+    walk = Walk(0, -1, (*before, AT_BODY, *(each._replace(walls=(math.pi,)) for each in beyond)))
+    proof, near = SwarmProof(), {0: (NearArc(arc(330, 510), 0),), 1: (NearArc(closed, 0),)}
+    proof.update(SCAN, [walk], {}, near, {})
+    assert {slot: degrees(arcs) for slot, arcs in proof.open_arcs().items()} == opened
+
+
+@pytest.mark.parametrize(("further_m", "left"), [(0.1, {}), (-0.1, {}), (0.2, {0: (BODY,), 2: (BODY,)})])
 def test_no_opening_is_between_two_places_of_a_wall_that_are_closer_than_a_body(
-    further_m: float, left: dict[int, tuple[tuple[int, ...], ...]]
+    further_m: float, left: dict[int, tuple[LeftWall, ...]]
 ) -> None:
     """A robot that pushed a body along the wall left the wall beside it, and came to the same wall again."""
     before, after = point(_0=10)._replace(at=(1.0, 0.5)), point(_0=20)._replace(at=(1.0 + further_m, 0.5))
     walk = Walk(0, -1, (before, AT_BODY, after._replace(walls=(math.radians(-95.0),))))
     assert left_at_bodies(walk.points, stretches_of(walk), 0.07) == left
-    assert left_at_bodies(walk.points, stretches_of(walk), 0.0) == {0: ((),), 2: ((),)}
+    assert left_at_bodies(walk.points, stretches_of(walk), 0.0) == {0: (BODY,), 2: (BODY,)}
 
 
 @pytest.mark.parametrize(("between", "opened"), [(AT_BODY, [(245, 255), (330, 150)]), (None, [(330, 150)])])
