@@ -208,8 +208,9 @@ class PushExecution:
         slots.add(leader)
         there = there or leader in arrived
         followers, going = self._without_lost(followers, going, arrived)
+        at_landmarks = [robot for robot in followers if _found_by_still_landmarks(arrived, robot)]
         arrived = arrived | (yield from self._home_again(followers, going, arrived))  # others use them as a ruler
-        yield from self._straighten(followers, going, path[0], arrived)
+        yield from self._straighten(followers, going, path[0], arrived, at_landmarks)
         return followers, there
 
     # --- steps of a push ----------------------------------------------------------------------------------------------
@@ -270,11 +271,17 @@ class PushExecution:
         return [robot for robot, _ in left], [slot for _, slot in left]
 
     def _straighten(
-        self, followers: Sequence[int], going: Sequence[int], rear: int, arrived: Mapping[int, Arrived]
+        self,
+        followers: Sequence[int],
+        going: Sequence[int],
+        rear: int,
+        arrived: Mapping[int, Arrived],
+        at_landmarks: Collection[int],
     ) -> Routine[None]:
         """Correct distances in a single file, rear to front, where bearings did not determine them.
 
-        A robot that drove too far does not see the robot behind, so the command names its direction.
+        A robot that drove too far does not see the robot behind, so the command names its direction. The robots
+        `at_landmarks` found their places by robots that did not move.
         """
         slots = self._slots
         for robot, slot in zip(followers, going, strict=True):
@@ -284,7 +291,8 @@ class PushExecution:
             if by_odometry and (slot, rear) not in slots.length_m and rear in slots.occupant and back is not None:
                 there = yield from self.correct(robot, [(slots.occupant[rear], back - slots.heading[robot])])
             if there is not None:
-                slots.note_way(rear, slot, turned_vector(there.way, slots.heading[robot]), by_odometry)
+                way = turned_vector(there.way, slots.heading[robot])
+                slots.note_way(rear, slot, way, by_odometry, robot in at_landmarks)
             rear = slot
 
     def _home_again(
@@ -369,3 +377,9 @@ def _waits_for_others(arrived: Arrived) -> bool:
 
 def _used_moving_landmarks(arrived: Mapping[int, Arrived], robot: int) -> bool:
     return robot in arrived and arrived[robot].used_moving_landmarks
+
+
+def _found_by_still_landmarks(arrived: Mapping[int, Arrived], robot: int) -> bool:
+    """Return whether bearings of landmarks that did not move determine the place of a robot."""
+    there = arrived.get(robot)
+    return there is not None and not (there.used_odometry or there.used_moving_landmarks)

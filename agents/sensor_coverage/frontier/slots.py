@@ -350,19 +350,22 @@ class Slots:
         way = self._ways.get((a, b)) or self._ways.get((b, a))
         return known or (math.inf if way is None else math.hypot(*way))
 
-    def note_way(self, start: int, end: int, way: tuple[float, float], by_odometry: bool) -> None:
+    def note_way(
+        self, start: int, end: int, way: tuple[float, float], by_odometry: bool, at_landmarks: bool = False
+    ) -> None:
         """Note the way (x, y) [m] that a robot drove from slot to slot, in the frame of the directions.
 
         If it differs from what a former robot drove, the robot stands elsewhere: what former robots saw of walls closes nothing
         there. So it may if it found its place by odometry, where nobody drove before. Attempts at its arcs are not counted
-        anew: where robots die one after the other, they had no end.
+        anew: where robots die one after the other, they had no end. Bearings of robots that stood still all the time
+        (`at_landmarks`) show the place, however the robot drove there.
         """
         known, length_m = self._ways.get((start, end)), self.length_m.get((start, end))
         if known is not None:
             is_off = math.dist(known, way) > DISPLACED_M_MIN
         else:
             is_off = by_odometry if length_m is None else abs(length_m - math.hypot(*way)) > DISPLACED_M_MIN
-        if is_off:
+        if is_off and not at_landmarks:
             seen = any(end in point.seen for walk in self.walks for point in walk.points)
             if seen or self.near.get(end):
                 self._forget_walls({end: None})

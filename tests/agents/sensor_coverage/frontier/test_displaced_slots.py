@@ -140,6 +140,15 @@ def test_a_slot_to_which_nobody_drove_before_may_be_displaced() -> None:
     assert [tuple(each.seen) for each in slots.walks[0].points] == [(0,), (0,)]
 
 
+@pytest.mark.parametrize("at_landmarks", [True, False])
+def test_a_robot_that_found_its_place_by_robots_that_stood_still_is_at_its_slot(at_landmarks: bool) -> None:
+    """It may have driven around a corner, or from a slot of which the distance was measured with an error."""
+    slots = three_slots()
+    slots.note_way(0, 1, (0.5, 0.0), by_odometry=False)
+    slots.note_way(0, 1, (0.7, 0.2), by_odometry=False, at_landmarks=at_landmarks)
+    assert (1 in slots.near) is at_landmarks
+
+
 @pytest.mark.parametrize(("off_deg", "remains"), [(12.0, False), (5.0, True)])
 def test_walls_close_by_are_forgotten_where_a_new_robot_stands_beside_its_slot(off_deg: float, remains: bool) -> None:
     slots = three_slots()
