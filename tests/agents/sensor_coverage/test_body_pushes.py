@@ -24,14 +24,17 @@ EAST = 0.0
 
 
 class AtBody:
-    """A robot in touch with a body. A velocity moves it by `fraction` of a full step; without one `back_m` moves it."""
+    """A robot in touch with a body. A velocity moves it by `fraction` of a full step.
+
+    In ticks without one it moves back, by these fractions of a full step.
+    """
 
     step_m = 0.05
 
-    def __init__(self, fraction: float, back_m: float = 0.0) -> None:
+    def __init__(self, fraction: float, *back: float) -> None:
         self.position = 0.0, 0.0
         self.frame = OdometryFrame()
-        self.fraction, self._back_m = fraction, back_m
+        self.fraction, self._back = fraction, list(back)
         self.touch((BODY, EAST))
 
     def touch(self, *contacts: tuple[int | None, float]) -> None:
@@ -44,7 +47,7 @@ class AtBody:
     def drive(self, velocity: BodyVelocity) -> None:
         """Move as one tick of this velocity does."""
         x, y = self.position
-        back_m = self._back_m if velocity == STOP else 0.0
+        back_m = self._back.pop(0) * self.step_m if velocity == STOP and self._back else 0.0
         self.position = x + self.fraction * velocity.forward_m_s - back_m, y + self.fraction * velocity.left_m_s
 
 
@@ -82,8 +85,9 @@ def test_a_body_that_yields_stops_nothing_and_is_no_wall() -> None:
     assert bodies.contacts() == []
 
 
-def test_a_robot_that_pushes_back_lives_and_is_no_wall() -> None:
-    robot = AtBody(fraction=0.0, back_m=0.02)
+@pytest.mark.parametrize("back", [(0.5, 0.0), (0.1, 0.1)])
+def test_a_robot_that_pushes_back_lives_and_is_no_wall(back: tuple[float, ...]) -> None:
+    robot = AtBody(0.0, *back)
     bodies = bodies_of(robot)
     push(robot, bodies)
     assert not bodies.is_body(BODY)
@@ -92,9 +96,9 @@ def test_a_robot_that_pushes_back_lives_and_is_no_wall() -> None:
     assert push(robot, bodies) == []
 
 
-def test_bodies_that_spring_apart_by_a_tenth_of_a_step_are_walls() -> None:
-    """So far they were pressed against the walls of a corner."""
-    robot = AtBody(fraction=0.0, back_m=0.1 * AtBody.step_m / REST_TICKS)
+def test_bodies_that_spring_apart_in_one_tick_are_walls() -> None:
+    """So far they were pressed against the walls of a wedge."""
+    robot = AtBody(0.0, 0.3, 0.0)
     bodies = bodies_of(robot)
     push(robot, bodies)
     assert bodies.firm() == (EAST,)

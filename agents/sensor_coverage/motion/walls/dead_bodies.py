@@ -13,6 +13,7 @@ walls of a corner on which they lean, and if they did not yield meanwhile.
 
 import math
 from collections.abc import Callable, Collection, Generator, Sequence
+from itertools import pairwise
 from typing import Final, Protocol
 
 import msgspec
@@ -30,10 +31,10 @@ PUSH_TICKS: Final = 3
 # A body does not yield if the robot moves in these ticks by less than this fraction of full steps: 18 free bodies in a row
 # yield by more, and so does a body that is free in a direction within 75 degrees of the push.
 YIELD_FRACTION: Final = 0.05
-# Ticks for which the robot then stands still. A robot that lives and was displaced drives back meanwhile, by more than this
-# fraction of a full step. Bodies that were pressed against walls only spring apart, by a tenth of a step.
+# Ticks for which the robot then stands still. Bodies that were pressed against walls spring apart in the first of them, by up
+# to 0.3 of a full step in a wedge. A robot that lives and was displaced drives back by more, or goes on in the next one.
 REST_TICKS: Final = 2
-BACK_FRACTION: Final = 0.2
+BACK_FRACTION: Final = 0.4
 # A body is pushed again when its direction has turned by this [rad], or after so many ticks without a contact.
 AGAIN_RAD: Final = math.radians(25.0)
 APART_TICKS: Final = 2
@@ -188,10 +189,12 @@ class DeadBodies:
                 way_m += (motion.position[0] - before[0]) * ux + (motion.position[1] - before[1]) * uy
         if node not in self._touched() or way_m > YIELD_FRACTION * motion.step_m * (PUSH_TICKS - 1):
             return
-        before = motion.position
+        places = [motion.position]
         for _ in range(REST_TICKS):
             yield BodyVelocity()
-        if math.dist(before, motion.position) > BACK_FRACTION * motion.step_m:
+            places.append(motion.position)
+        first, *more = (math.dist(a, b) / motion.step_m for a, b in pairwise(places))
+        if first > BACK_FRACTION or max(more) > YIELD_FRACTION:
             self._living[node] = None
         elif node in self._touched():
             self._firm[node] = _Pushed(direction_rad)

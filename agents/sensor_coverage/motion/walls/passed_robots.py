@@ -2,18 +2,25 @@
 
 A robot in touch is two radii away, in the direction of its bearing. So its place is known on the way along the wall, before
 the contact and after it. It closes the walls there as if it had left its slot for them and come back (`near_arcs`). A passed
-robot is pushed aside, and returns to where it stood: its place is that of the first contact.
+robot is pushed aside, and returns to where it stood: its place is that of the first contact. A contact with a wall in the
+direction of a robot farther away counts as one with that robot (`touched_robots`). Then it saw the walking robot before in
+other directions than from that place.
 """
 
 import math
 from collections.abc import Iterable, Iterator
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import place_of_robot
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Walk, WalkPoint
 from zwerm.agents.sensor_coverage.messages.commands import NearWalls
-from zwerm.agents.sensor_coverage.motion.homing import Vector
+from zwerm.agents.sensor_coverage.motion.homing import Vector, unit
 from zwerm.agents.sensor_coverage.motion.walls.near_arcs import FollowedWay, NearPoint, walls_around
+
+# From the place of the contact, a passed robot saw the walking robot so close [m] to where that was, and so close [rad] to its
+# direction: it may have been pushed already, and bearings have noise.
+OFF_M: Final = 0.1
+OFF_RAD: Final = math.radians(10.0)
 
 
 class PassedRobot(NamedTuple):
@@ -33,7 +40,10 @@ def passed_robots(walk: Walk, reach_m: float) -> Iterator[PassedRobot]:
         for first, last in _contacts(walk.points, slot):
             met = walk.points[first]
             place = place_of_robot(met.at, met.seen[slot], walk.radius_m)
-            for hand, points in ((-walk.hand, _before(walk.points, first)), (walk.hand, walk.points[last:])):
+            sides = tuple(_before(walk.points, first)), walk.points[last:]
+            if not _stood(slot, place, sides, walk.radius_m):
+                continue
+            for hand, points in zip((-walk.hand, walk.hand), sides, strict=True):
                 way = list(_near_points(points, slot, place, reach_m))
                 yield PassedRobot(slot, walls_around(place, FollowedWay(way, hand, walk.radius_m, True)), hand)
 
@@ -57,6 +67,25 @@ def _before(points: tuple[WalkPoint, ...], first: int) -> Iterator[WalkPoint]:
         yield each
         if each.left_walls:
             return
+
+
+def _stood(slot: int, place: Vector, sides: Iterable[Iterable[WalkPoint]], radius_m: float) -> bool:
+    """Return whether the robot of a slot stood at a place [m], by the directions in which it saw the points of a walk.
+
+    The points before the contact show it, if there are any. During the contact the walking robot pushes it aside.
+    """
+    for points in sides:
+        seen = [each for each in points if slot in each.seen and slot not in each.robots]
+        if seen:
+            return all(_may_see(place, each.at, each.seen[slot], radius_m) for each in seen)
+    return True
+
+
+def _may_see(place: Vector, at: Vector, there: float, radius_m: float) -> bool:
+    """Return whether a robot near a place [m] may see another place in the direction `there` [rad]."""
+    (x, y), (ux, uy) = (at[0] - place[0], at[1] - place[1]), unit(there)
+    ahead_m, aside_m = x * ux + y * uy, abs(x * uy - y * ux)
+    return ahead_m > radius_m - OFF_M and aside_m < OFF_M + OFF_RAD * ahead_m
 
 
 def _near_points(points: Iterable[WalkPoint], slot: int, place: Vector, reach_m: float) -> Iterator[NearPoint]:

@@ -5,6 +5,8 @@ The wall is in the south, at y = 0. The walking robot goes east, and around the 
 
 import math
 
+import pytest
+
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, Walk, WalkPoint, contains
 from zwerm.agents.sensor_coverage.motion.walls.passed_robots import passed_robots
 
@@ -56,3 +58,18 @@ def test_a_passed_robot_does_not_know_a_wall_that_was_left_before_the_contact() 
 def test_a_robot_that_is_not_in_sight_has_no_known_place() -> None:
     walk = walk_past()
     assert not list(passed_robots(walk._replace(points=tuple(each.unseen_by((SLOT,)) for each in walk.points)), 0.95))
+
+
+@pytest.mark.parametrize("part", [slice(None), slice(len(BEFORE), None)], ids=["before", "only after the contact"])
+@pytest.mark.parametrize(("off_m", "is_known"), [(0.08, True), (0.4, False)])
+def test_a_contact_in_the_direction_of_a_robot_farther_away_is_not_with_it(
+    off_m: float, is_known: bool, part: slice
+) -> None:
+    """It is with a corner of the wall. The robot stands behind it, and sees the walking robot in other directions."""
+    walk = walk_past()
+    behind = PLACE[0], PLACE[1] - off_m
+    points = tuple(
+        each if each.robots else each._replace(seen={SLOT: math.atan2(each.at[1] - behind[1], each.at[0] - behind[0])})
+        for each in walk.points[part]
+    )
+    assert bool(list(passed_robots(walk._replace(points=points), 0.95))) is is_known

@@ -80,6 +80,13 @@ def test_a_narrow_opening_is_not_passed_by(seed: int, dies: bool, more: tuple[st
         pytest.param(
             1062, 2, True, (NOISE,), id="noise, a chicane of 1.8 bodies, from which a robot kept a walk, and died"
         ),
+        pytest.param(
+            1410,
+            2,
+            True,
+            (EXACT, BRIEF),
+            id="a body in a bend of 1.4 bodies, and a corner in line with a robot behind it",
+        ),
         pytest.param(776, 3, True, (EXACT,), id="a body in a bend of 1.8 bodies beside three robots in line"),
     ],
 )
