@@ -6,7 +6,7 @@ chain comes back to where it began, nobody has seen the space.
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
@@ -61,6 +61,10 @@ class Answered(NamedTuple):
 
     gap: Arc
     others: Sequence[tuple[int, Arc]]
+
+    def within(self, closed: Iterable[Arc]) -> Iterator["Answered"]:
+        """Yield the parts of the gap that lie in arcs which are closed but for it: the others answer for no more."""
+        yield from (self._replace(gap=part) for each in closed for part in shared_arcs(self.gap, each))
 
     def arcs(self, gaps: Mapping[int, Sequence[Arc]]) -> list[Arc]:
         """Return the gap if the slots with these gaps close it."""

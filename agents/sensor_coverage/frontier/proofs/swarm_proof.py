@@ -122,9 +122,13 @@ class SwarmProof:
 
     def _circular(self) -> dict[int, list[Arc]]:
         """Return the gaps that slots close by relying on each other in a circle."""
-        gaps = {slot: complement(self._closed_without_fans(slot)) for slot in self._around}
-        answered = {slot: each.answered for slot, each in self._wall_arcs.items() if each.answered}
-        for slot, each in ((slot, each) for slot, several in answered.items() for each in several):
+        closed = {slot: self._closed_without_fans(slot) for slot in self._around}
+        gaps = {slot: complement(each) for slot, each in closed.items()}
+        answered = {
+            slot: [part for each in self._wall_arcs[slot].answered for part in each.within(arcs)]
+            for slot, arcs in closed.items()
+        }
+        for slot, each in ((slot, each) for slot, parts in answered.items() for each in parts):
             for other, arc in ((slot, each.gap), *each.others):
                 gaps[other] = united([*gaps[other], *self._beside_edges(other, arc)])
         return circular_gaps(gaps, {slot: list(self._fans(slot)) for slot, each in gaps.items() if each}, answered)
@@ -248,11 +252,8 @@ class SwarmProof:
 
     def _closed_without_fans(self, slot: int) -> list[Arc]:
         """Return the arcs of a slot that walls and triangles of robots close."""
-        return [
-            *self._wall_arcs[slot].followed,
-            *arcs_of_walls(self._around[slot].touched),
-            *self._by_robots.all(slot),
-        ]
+        walls, robots = self._wall_arcs[slot].followed, self._by_robots.all(slot)
+        return [*walls, *arcs_of_walls(self._around[slot].touched), *robots]
 
     def _choose(self, pair: Pair) -> dict[int, int]:
         """Return the number of the point of the triangle on each side of an edge: the one that closes most at both ends.
@@ -269,11 +270,10 @@ class SwarmProof:
     def _candidates(self, pair: Pair) -> dict[int, list[int]]:
         """Return the numbers of the points of the triangles with an edge that count at one of its ends, by side."""
         found: dict[int, list[int]] = {}
-        there = self._views[pair[0]][pair[1]]
         for each in self._passed.get(pair[0], ()):
             counting = self._triangles.pairs(each.number)
             if pair in counting or pair[::-1] in counting:
-                found.setdefault(side_of(each.point, pair[0], there), []).append(each.number)
+                found.setdefault(side_of(each.point, pair[0], self._views[pair[0]][pair[1]]), []).append(each.number)
         return found
 
     def _best(self, pair: Pair, numbers: Sequence[int], opened: Mapping[int, Sequence[Arc]]) -> int:

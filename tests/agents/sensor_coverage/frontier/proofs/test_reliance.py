@@ -100,3 +100,10 @@ def test_slots_that_answer_for_each_other_leave_their_gaps_open() -> None:
     behind, clear = fan(0, 60.0, 120.0, 170.0), fan(2, 60.0, 120.0, 170.0)
     assert degrees(circular_gaps(gaps, {1: [behind]}, answered)) == {0: [(165, 175)], 1: [(80, 100)]}
     assert circular_gaps(gaps, {1: [clear]}, answered) == {}, "negative control: slot 2 has no gap"
+
+
+def test_other_slots_answer_for_no_more_of_a_gap_than_is_closed_but_for_the_edge_of_sight() -> None:
+    answered = Answered(arc(40, 50), [(1, arc(60, 90))])
+    within = list(answered.within([arc(30, 44), arc(48, 60)]))
+    assert degrees({0: [each.gap for each in within]}) == {0: [(40, 44), (48, 50)]}
+    assert {tuple(each.others) for each in within} == {tuple(answered.others)}
