@@ -3,8 +3,8 @@
 A robot in touch is two radii away, in the direction of its bearing. So its place is known on the way along the wall, before
 the contact and after it. It closes the walls there as if it had left its slot for them and come back (`near_arcs`). A passed
 robot is pushed aside, and returns to where it stood: its place is that of the first contact. A contact with a wall in the
-direction of a robot farther away counts as one with that robot (`touched_robots`). Then it saw the walking robot before in
-other directions than from that place.
+direction of a robot farther away counts as one with that robot (`touched_robots`). Then it saw the walking robot before or
+after in other directions than from that place.
 """
 
 import math
@@ -40,12 +40,12 @@ def passed_robots(walk: Walk, reach_m: float) -> Iterator[PassedRobot]:
         for first, last in _contacts(walk.points, slot):
             met = walk.points[first]
             place = place_of_robot(met.at, met.seen[slot], walk.radius_m)
-            sides = tuple(_before(walk.points, first)), walk.points[last:]
-            if not _stood(slot, place, sides, walk.radius_m):
-                continue
-            for hand, points in zip((-walk.hand, walk.hand), sides, strict=True):
-                way = list(_near_points(points, slot, place, reach_m))
-                yield PassedRobot(slot, walls_around(place, FollowedWay(way, hand, walk.radius_m, True)), hand)
+            sides = _before(walk.points, first), walk.points[last:]
+            ways = [list(_in_reach(points, slot, place, reach_m)) for points in sides]
+            if all(_may_see(place, each, slot, walk.radius_m) for points in ways for each in points):
+                for hand, points in zip((-walk.hand, walk.hand), ways, strict=True):
+                    way = [_near_point(each, slot) for each in points]
+                    yield PassedRobot(slot, walls_around(place, FollowedWay(way, hand, walk.radius_m, True)), hand)
 
 
 def _contacts(points: tuple[WalkPoint, ...], slot: int) -> Iterator[tuple[int, int]]:
@@ -69,29 +69,27 @@ def _before(points: tuple[WalkPoint, ...], first: int) -> Iterator[WalkPoint]:
             return
 
 
-def _stood(slot: int, place: Vector, sides: Iterable[Iterable[WalkPoint]], radius_m: float) -> bool:
-    """Return whether the robot of a slot stood at a place [m], by the directions in which it saw the points of a walk.
-
-    The points before the contact show it, if there are any. During the contact the walking robot pushes it aside.
-    """
-    for points in sides:
-        seen = [each for each in points if slot in each.seen and slot not in each.robots]
-        if seen:
-            return all(_may_see(place, each.at, each.seen[slot], radius_m) for each in seen)
-    return True
-
-
-def _may_see(place: Vector, at: Vector, there: float, radius_m: float) -> bool:
-    """Return whether a robot near a place [m] may see another place in the direction `there` [rad]."""
-    (x, y), (ux, uy) = (at[0] - place[0], at[1] - place[1]), unit(there)
-    ahead_m, aside_m = x * ux + y * uy, abs(x * uy - y * ux)
-    return ahead_m > radius_m - OFF_M and aside_m < OFF_M + OFF_RAD * ahead_m
-
-
-def _near_points(points: Iterable[WalkPoint], slot: int, place: Vector, reach_m: float) -> Iterator[NearPoint]:
+def _in_reach(points: Iterable[WalkPoint], slot: int, place: Vector, reach_m: float) -> Iterator[WalkPoint]:
     """Yield the points from a contact on up to the next one with the same robot, or up to one out of reach."""
     for number, each in enumerate(points):
         if math.dist(each.at, place) > reach_m or (number and slot in each.robots):
             return
-        at_body = each.at_body or any(other != slot for other in each.robots)
-        yield NearPoint(each.at, each.walls, each.at_body, at_body)
+        yield each
+
+
+def _may_see(place: Vector, point: WalkPoint, slot: int, radius_m: float) -> bool:
+    """Return whether the robot of a slot may have seen a point from near a place [m] in the direction that is known.
+
+    While it is in touch, it may be pushed aside.
+    """
+    if slot not in point.seen or slot in point.robots:
+        return True
+    (x, y), (ux, uy) = (point.at[0] - place[0], point.at[1] - place[1]), unit(point.seen[slot])
+    ahead_m, aside_m = x * ux + y * uy, abs(x * uy - y * ux)
+    return ahead_m > radius_m - OFF_M and aside_m < OFF_M + OFF_RAD * ahead_m
+
+
+def _near_point(point: WalkPoint, slot: int) -> NearPoint:
+    """Return a point of a walk as one of a way close to the robot of a slot."""
+    at_body = point.at_body or any(other != slot for other in point.robots)
+    return NearPoint(point.at, point.walls, at_body, at_body)

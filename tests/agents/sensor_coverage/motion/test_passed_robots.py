@@ -60,7 +60,11 @@ def test_a_robot_that_is_not_in_sight_has_no_known_place() -> None:
     assert not list(passed_robots(walk._replace(points=tuple(each.unseen_by((SLOT,)) for each in walk.points)), 0.95))
 
 
-@pytest.mark.parametrize("part", [slice(None), slice(len(BEFORE), None)], ids=["before", "only after the contact"])
+@pytest.mark.parametrize(
+    "part",
+    [slice(None), slice(len(BEFORE), None), slice(len(BEFORE) + len(AROUND))],
+    ids=["before and after", "only after the contact", "only before it"],
+)
 @pytest.mark.parametrize(("off_m", "is_known"), [(0.08, True), (0.4, False)])
 def test_a_contact_in_the_direction_of_a_robot_farther_away_is_not_with_it(
     off_m: float, is_known: bool, part: slice

@@ -87,6 +87,13 @@ def test_a_narrow_opening_is_not_passed_by(seed: int, dies: bool, more: tuple[st
             (EXACT, BRIEF),
             id="a body in a bend of 1.4 bodies, and a corner in line with a robot behind it",
         ),
+        pytest.param(
+            1591,
+            1,
+            False,
+            (EXACT, BRIEF),
+            id="a chicane of 1.4 bodies, past whose corner a robot sees the walk along a line",
+        ),
         pytest.param(776, 3, True, (EXACT,), id="a body in a bend of 1.8 bodies beside three robots in line"),
     ],
 )
