@@ -11,7 +11,6 @@ import math
 from collections.abc import Iterable, Iterator
 from typing import Final, NamedTuple
 
-from zwerm.agents.sensor_coverage.frontier.directions import angle_between
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import place_of_robot
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Walk, WalkPoint
 from zwerm.agents.sensor_coverage.messages.commands import NearWalls
@@ -22,8 +21,6 @@ from zwerm.agents.sensor_coverage.motion.walls.near_arcs import FollowedWay, Nea
 # direction: it may have been pushed already, and bearings have noise.
 OFF_M: Final = 0.1
 OFF_RAD: Final = math.radians(10.0)
-# The directions show how far away the robot is if they differ by more than this [rad].
-SIDE_RAD: Final = math.radians(30.0)
 
 
 class PassedRobot(NamedTuple):
@@ -45,10 +42,7 @@ def passed_robots(walk: Walk, reach_m: float) -> Iterator[PassedRobot]:
             place = place_of_robot(met.at, met.seen[slot], walk.radius_m)
             sides = _before(walk.points, first), walk.points[last:]
             ways = [list(_in_reach(points, slot, place, reach_m)) for points in sides]
-            seen = [each.seen[slot] for points in ways for each in points if slot in each.seen]
-            if any(angle_between(each, met.seen[slot]) > SIDE_RAD for each in seen) and all(
-                _may_see(place, each, slot, walk.radius_m) for points in ways for each in points
-            ):
+            if all(_may_see(place, each, slot, walk.radius_m) for points in ways for each in points):
                 for hand, points in zip((-walk.hand, walk.hand), ways, strict=True):
                     way = [_near_point(each, slot) for each in points]
                     yield PassedRobot(slot, walls_around(place, FollowedWay(way, hand, walk.radius_m, True)), hand)

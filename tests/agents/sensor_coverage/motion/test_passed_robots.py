@@ -77,14 +77,3 @@ def test_a_contact_in_the_direction_of_a_robot_farther_away_is_not_with_it(
         for each in walk.points[part]
     )
     assert bool(list(passed_robots(walk._replace(points=points), 0.95))) is is_known
-
-
-def test_sights_along_one_line_do_not_show_how_far_away_a_robot_is() -> None:
-    """The walking robot came along the line of sight, and turned back at the contact."""
-    walk = walk_past()
-    to_contact = [each for each in walk.points if each.robots][:1]
-    line = [to_contact[0]._replace(robots=(), at=(PLACE[0] - 0.05 * each, PLACE[1])) for each in range(10, 3, -1)]
-    seen = [each._replace(seen={SLOT: math.pi}) for each in (*line, to_contact[0]._replace(at=(-0.14, PLACE[1])))]
-    assert not list(passed_robots(walk._replace(points=(*seen, *seen[-2::-1])), 0.95))
-    aside = seen[0]._replace(seen={SLOT: math.radians(100.0)}, at=(PLACE[0] - 0.04, PLACE[1] + 0.25))
-    assert list(passed_robots(walk._replace(points=(*seen, aside)), 0.95)), "negative control: one sight from the side"
