@@ -21,7 +21,7 @@ def test_the_distances_of_robots_after_walks_are_true(noise_rad: float, monkeypa
     monkeypatch.setattr(
         SensorCoverageCoordinator, "__init__", lambda self, setup: (begin(self, setup), started.append(self))[0]
     )
-    for seed in range(101, 108):
+    for seed in range(101, 114):
         settings = (
             ROOMS,
             f"base.pose=[0.4,0.6,{0.4 * seed}]",
