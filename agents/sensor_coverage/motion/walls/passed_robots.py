@@ -3,8 +3,8 @@
 A robot in touch is two radii away, in the direction of its bearing. So its place is known on the way along the wall, before
 the contact and after it. It closes the walls there as if it had left its slot for them and come back (`near_arcs`). A passed
 robot is pushed aside, and returns to where it stood: its place is that of the first contact. A contact with a wall in the
-direction of a robot farther away counts as one with that robot (`touched_robots`). Then it saw the walking robot before or
-after in other directions than from that place.
+direction of a robot farther away may count as one with that robot (`touched_robots`). A place from which it would have seen
+the walking robot before or after in other directions does not count.
 """
 
 import math
