@@ -222,8 +222,8 @@ def test_a_slot_answers_for_what_is_between_two_walls_if_it_closes_that(
 ) -> None:
     """Nothing else is open. Slot 1 sees the walls on both sides of a body beside each other, slot 0 in one direction."""
     beside = [{1: math.radians(each)} for each in saw] or [{}, {}]
-    before = (*BEFORE[:-1], BEFORE[-1]._replace(seen=BEFORE[-1].seen | beside[0]))
-    beyond = (BEYOND[0]._replace(seen=BEYOND[0].seen | beside[1]), *BEYOND[1:])
+    before = (*BEFORE[:-1], BEFORE[-1]._replace(seen={**BEFORE[-1].seen, **beside[0]}))
+    beyond = (BEYOND[0]._replace(seen={**BEYOND[0].seen, **beside[1]}), *BEYOND[1:])
     walk = Walk(0, -1, (*before, AT_BODY, *(each._replace(walls=(math.pi,)) for each in beyond)))
     proof, near = SwarmProof(), {0: (NearArc(arc(330, 510), 0),), 1: (NearArc(closed, 0),)}
     proof.update(SCAN, [walk], {}, near, {})
