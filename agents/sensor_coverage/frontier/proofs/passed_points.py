@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.directions import angle_between
@@ -103,6 +104,38 @@ def passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
                 Passed(first + number, before, point, walk.hand, between, number_of, ends, pockets, edges, dark, ties),
             )
             last[slot] = now
+
+
+def still_counting(slot: int, passed: Sequence[Passed], gone: AbstractSet[int]) -> Sequence[Passed]:
+    """Return the points that a slot saw of walks, without those that slots saw which are `gone`.
+
+    Where a stretch of wall goes on as one of these saw it, nobody knows what is beyond: an edge of sight is there.
+    """
+    if not gone:
+        return passed
+    found = list[Passed]()
+    stretch, lost, ends = -1, False, dict[int, float]()  # the stretch of the point before; where a stretch counts again
+    for each in passed:
+        counts = gone.isdisjoint(each.point.seen)
+        goes_on = each.stretch == stretch >= 0
+        if counts and (each.before is None or gone.isdisjoint(each.before.seen)):
+            if goes_on and lost:
+                each = _with_end(each, ends.get(stretch, each.point.seen[slot]))
+            found.append(each)
+            lost = False
+        else:
+            if goes_on and not lost:
+                found[-1] = _with_end(found[-1], found[-1].point.seen[slot])
+            ends = {each.stretch: each.point.seen[slot]} if counts else {}
+            lost = True
+        stretch = each.stretch
+    return found
+
+
+def _with_end(passed: Passed, there: float) -> Passed:
+    """Return a point of a walk with an edge of sight in a direction [rad]: nobody is known to have seen what is beyond."""
+    end = SightEnd(there, ())
+    return passed._replace(sight_ends=(*passed.sight_ends, end), dark_ends=(*passed.dark_ends, end))
 
 
 def _ties_at(number: int, stretch: FollowedStretch) -> tuple[int, ...]:

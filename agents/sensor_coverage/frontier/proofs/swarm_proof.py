@@ -12,7 +12,7 @@ from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.fans import Pair, pair_of, side_of
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
-from zwerm.agents.sensor_coverage.frontier.proofs.passed_points import Passed, passes
+from zwerm.agents.sensor_coverage.frontier.proofs.passed_points import Passed, passes, still_counting
 from zwerm.agents.sensor_coverage.frontier.proofs.point_triangles import PointTriangles
 from zwerm.agents.sensor_coverage.frontier.proofs.reliance import Fan, circular_gaps
 from zwerm.agents.sensor_coverage.frontier.proofs.robot_arcs import RobotArcs
@@ -313,11 +313,7 @@ class SwarmProof:
 
     def _find_walls(self, slot: int) -> WallArcs:
         """Return the arcs of a slot that end at followed walls or at contacts."""
-        passed = [
-            each
-            for each in self._passed.get(slot, ())
-            if self._counts(each.point) and (each.before is None or self._counts(each.before))
-        ]
+        passed = still_counting(slot, self._passed.get(slot, ()), self._gone.keys())
 
         def touched_by(robot: int) -> Sequence[float]:
             return self._touched_by.get((slot, robot), ())

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
-from zwerm.agents.sensor_coverage.frontier.proofs.passed_points import LeftWall, left_at_bodies
+from zwerm.agents.sensor_coverage.frontier.proofs.passed_points import LeftWall, left_at_bodies, passes, still_counting
 from zwerm.agents.sensor_coverage.frontier.proofs.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import (
     SightEnd,
@@ -132,6 +132,42 @@ def test_two_other_walls_that_meet_there_do_not_close_a_dark_edge(
     """The noise of bearings may make walls on both sides of a passage meet."""
     sides = (point(_0=220), point(_0=235), point(_0=251)), (point(_0=249), point(_0=265), point(_0=280))
     assert sorted(open_at_0((*BEFORE, behind), (behind, *BEYOND), *sides)) == opened
+
+
+@pytest.mark.parametrize(("seen_by_2", "opened"), [(True, [(245, 255), (280, 150)]), (False, [(290, 150)])])
+def test_an_edge_of_sight_is_where_a_walk_counts_no_more_because_a_slot_that_saw_it_is_gone(
+    seen_by_2: bool, opened: list[tuple[int, int]]
+) -> None:
+    """What is beyond was the part of slot 2. Two other walls, which it did not see, do not close it."""
+    by_2 = {"_2": 90} if seen_by_2 else {}
+    walk = (*BEFORE, point(_0=260, **by_2), point(_0=275, **by_2), point(_0=290, **by_2))
+    sides = (point(_0=220), point(_0=235), point(_0=251)), (point(_0=249), point(_0=265), point(_0=280))
+    walks, proof = [Walk(0, -1, each) for each in (walk, *sides)], SwarmProof()
+    views = {**VIEWS, 2: {0: 1.0}}
+    proof.update(
+        SCAN._replace(views=views, complex_=FlagComplex({**SCAN.complex_.neighbours, 2: set()})), walks, {}, {}, {}
+    )
+    proof.update(SCAN, walks, {}, {}, {})
+    assert sorted(degrees(proof.open_arcs()[0])) == opened
+
+
+@pytest.mark.parametrize(
+    ("gone", "edges"),
+    [
+        pytest.param(set(), {}, id="all stand"),
+        pytest.param({2}, {2: 30, 6: 60}, id="they begin and end where all stand again"),
+        pytest.param({1}, {}, id="nothing counts"),
+    ],
+)
+def test_points_count_no_more_if_a_slot_that_saw_them_is_gone(gone: set[int], edges: dict[int, int]) -> None:
+    seen_by_2 = (False, False, False, True, True, False, False, False)
+    points = [point(_0=10 * (n + 1), _1=0, **({"_2": 0} if seen else {})) for n, seen in enumerate(seen_by_2)]
+    of_0 = [each for slot, each in passes(Walk(0, -1, tuple(points)), 0) if slot == 0]
+    counting = still_counting(0, of_0, gone)
+    assert [each.number for each in counting] == {0: [*range(8)], 2: [0, 1, 2, 6, 7], 1: []}[sum(gone)]
+    ends = {each.number: round(math.degrees(end.direction_rad)) for each in counting for end in each.dark_ends}
+    assert ends == edges
+    assert all(each.sight_ends == each.dark_ends for each in counting)
 
 
 @pytest.mark.parametrize(("hand", "opened"), [(1, [(330, 150)]), (-1, [(245, 250), (330, 150)])])
