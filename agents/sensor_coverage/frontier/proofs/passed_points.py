@@ -7,7 +7,12 @@ from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.directions import angle_between
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStretch, Pocket, StretchEnd, touched_point
-from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import SightEnd, dark_ends_at, sight_ends_at
+from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import (
+    BESIDE_EDGE_RAD,
+    SightEnd,
+    dark_ends_at,
+    sight_ends_at,
+)
 from zwerm.agents.sensor_coverage.frontier.strips.stretches import pockets_beside, stretches_of
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     SAME_WALL_RAD,
@@ -62,6 +67,10 @@ class Passed(NamedTuple):
     dark_ends: tuple[SightEnd, ...] = ()
     ties: tuple[int, ...] = ()
 
+    def goes_on(self, standing: Collection[int]) -> bool:
+        """Return whether the walk went on to a robot at a slot, or out of sight, and one of these slots answers for that."""
+        return any(each in standing for each in self.ties) or any(each.is_seen(standing) for each in self.sight_ends)
+
 
 def passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
     """Yield each slot that saw a point of a walk with a contact, and that point; `first` is the number of the first point.
@@ -106,29 +115,37 @@ def passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
             last[slot] = now
 
 
-def still_counting(slot: int, passed: Sequence[Passed], gone: AbstractSet[int]) -> Sequence[Passed]:
+def still_counting(
+    slot: int, passed: Sequence[Passed], gone: AbstractSet[int], standing: Collection[int]
+) -> Sequence[Passed]:
     """Return the points that a slot saw of walks, without those that slots saw which are `gone`.
 
-    Where a stretch of wall goes on as one of these saw it, nobody knows what is beyond: an edge of sight is there.
+    Where a stretch of wall goes on as one of these saw it, nobody knows what is beyond. An edge of sight is there, until
+    a later walk went on there in sight of a `standing` slot, or to its robot.
     """
     if not gone:
         return passed
-    found = list[Passed]()
+    found, edges = list[Passed](), list[tuple[int, float]]()  # the number in `found`, and the direction
     stretch, lost, ends = -1, False, dict[int, float]()  # the stretch of the point before; where a stretch counts again
     for each in passed:
         counts = gone.isdisjoint(each.point.seen)
-        goes_on = each.stretch == stretch >= 0
+        goes_on, there = each.stretch == stretch >= 0, each.point.seen[slot]
         if counts and (each.before is None or gone.isdisjoint(each.before.seen)):
             if goes_on and lost:
-                each = _with_end(each, ends.get(stretch, each.point.seen[slot]))
+                edges.append((len(found), ends.get(stretch, there)))
             found.append(each)
             lost = False
         else:
             if goes_on and not lost:
-                found[-1] = _with_end(found[-1], found[-1].point.seen[slot])
-            ends = {each.stretch: each.point.seen[slot]} if counts else {}
+                edges.append((len(found) - 1, found[-1].point.seen[slot]))
+            ends = {each.stretch: there} if counts else {}
             lost = True
         stretch = each.stretch
+    onward = [number for number, each in enumerate(found) if each.goes_on(standing)] if edges else []
+    for number, there in edges:
+        later = (found[each].point.seen[slot] for each in onward if found[each].stretch > found[number].stretch)
+        if all(angle_between(each, there) > BESIDE_EDGE_RAD for each in later):
+            found[number] = _with_end(found[number], there)
     return found
 
 

@@ -313,7 +313,7 @@ class SwarmProof:
 
     def _find_walls(self, slot: int) -> WallArcs:
         """Return the arcs of a slot that end at followed walls or at contacts."""
-        passed = still_counting(slot, self._passed.get(slot, ()), self._gone.keys())
+        passed = still_counting(slot, self._passed.get(slot, ()), self._gone.keys(), self._neighbours)
 
         def touched_by(robot: int) -> Sequence[float]:
             return self._touched_by.get((slot, robot), ())

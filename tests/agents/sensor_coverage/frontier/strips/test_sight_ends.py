@@ -163,11 +163,26 @@ def test_points_count_no_more_if_a_slot_that_saw_them_is_gone(gone: set[int], ed
     seen_by_2 = (False, False, False, True, True, False, False, False)
     points = [point(_0=10 * (n + 1), _1=0, **({"_2": 0} if seen else {})) for n, seen in enumerate(seen_by_2)]
     of_0 = [each for slot, each in passes(Walk(0, -1, tuple(points)), 0) if slot == 0]
-    counting = still_counting(0, of_0, gone)
+    counting = still_counting(0, of_0, gone, (0, 1))
     assert [each.number for each in counting] == {0: [*range(8)], 2: [0, 1, 2, 6, 7], 1: []}[sum(gone)]
     ends = {each.number: round(math.degrees(end.direction_rad)) for each in counting for end in each.dark_ends}
     assert ends == edges
     assert all(each.sight_ends == each.dark_ends for each in counting)
+
+
+@pytest.mark.parametrize(
+    ("standing", "direction_deg", "edges"), [((0, 3), 33, [60]), ((0, 3), 45, [30, 60]), ((0,), 33, [30, 60])]
+)
+def test_a_later_walk_that_goes_on_in_sight_of_a_slot_closes_the_edge_where_an_earlier_one_counts_no_more(
+    standing: tuple[int, ...], direction_deg: int, edges: list[int]
+) -> None:
+    seen_by_2 = (False, False, False, True, True, False, False, False)
+    earlier = [point(_0=10 * (n + 1), **({"_2": 0} if seen else {})) for n, seen in enumerate(seen_by_2)]
+    later = [point(_0=direction_deg - 20), point(_0=direction_deg), point(_3=0)]
+    walks = [each for first, points in ((0, earlier), (8, later)) for each in passes(Walk(0, -1, tuple(points)), first)]
+    counting = still_counting(0, [each for slot, each in walks if slot == 0], {2}, standing)
+    found = [end for each in counting if each.number < 8 for end in each.dark_ends]
+    assert [round(math.degrees(each.direction_rad)) for each in found] == edges
 
 
 @pytest.mark.parametrize(("hand", "opened"), [(1, [(330, 150)]), (-1, [(245, 250), (330, 150)])])
