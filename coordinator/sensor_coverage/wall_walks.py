@@ -203,17 +203,21 @@ class WallWalks:
         return (robot,)
 
     def _note_near(self, robot: int, slot: int, walked: Walked, hand: int, moving: Collection[int] = ()) -> None:
-        """Record how a robot followed a wall close to its slot: what closes arcs there, and what others saw of it."""
-        heading = self._slots.heading[robot]
-        near, beside = walked.near.turned(heading), turned_arcs(walked.near_beside, heading)
-        # A robot that followed the wall and got neither past the arc nor clear has followed all walls around.
-        kind = 0 if walked.end == SHUT else hand
-        self._walls.note_near(slot, near, kind, robot)
-        self._walls.note_near(slot, NearWalls(beside), kind, ANYONE)
+        """Record how a robot followed a wall close to its slot: what closes arcs there, and what others saw of it.
+
+        A station stands while the robot drives. If a corner hid the robot, the station knows as much as others that saw it.
+        """
+        heading, station, origin = self._slots.heading[robot], self._slots.occupant[slot], Origin(slot, walked.start)
+        sees_all = station == robot or all(each.sees(station) for each in walked.waypoints)
+        if sees_all:
+            near, beside = walked.near.turned(heading), turned_arcs(walked.near_beside, heading)
+            # A robot that followed the wall and got neither past the arc nor clear has followed all walls around.
+            kind = 0 if walked.end == SHUT else hand
+            self._walls.note_near(slot, near, kind, robot)
+            self._walls.note_near(slot, NearWalls(beside), kind, ANYONE)
         if len(walked.waypoints) > 1:
-            origin = Origin(slot, walked.start)
-            way = walked.waypoints
-            number = self._slots.take_walk(robot, hand, way, walked.radius_m, origin=origin, moving=moving)
+            way, seen_from = walked.waypoints, origin if sees_all else None
+            number = self._slots.take_walk(robot, hand, way, walked.radius_m, origin=seen_from, moving=moving)
             self.idle = without_witnesses(self.idle, self._slots.walks[number].points)
 
     def axis(self, base: int) -> Routine[Sequence[float]]:

@@ -88,6 +88,10 @@ class Waypoint(_UplinkPart, frozen=True):
     robots: tuple[int, ...]
     start_rad: float | None = None
 
+    def sees(self, node: int) -> bool:
+        """Return whether the walking robot sees another one."""
+        return any(each.node == node for each in self.sightings)
+
 
 # --- to a robot -----------------------------------------------------------------------------------------------------
 

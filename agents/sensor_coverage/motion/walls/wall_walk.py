@@ -267,14 +267,17 @@ class WallWalk:
         motion, frame = self._motion, self._motion.frame
         frame.forget()
         self._bodies.begin()
-        yield from self._back_into_sight(keep)
-        if not self._sees(keep):
-            return LOST, 0.0, ()
+        self._in_reach.begin()
+        choice = WaypointChoice(motion.position, frame.seen, frame.contacts)
+        if not self._sees(keep):  # those that see it come back from here know that it was out of their sight
+            self._report(held)
+            yield from self._back_into_sight(keep)
+            if not self._sees(keep):
+                return LOST, 0.0, ()
+            choice.take(motion.position, frame.seen, frame.contacts)
         self._trail = [motion.position]
         self._turned_rad = 0.0
-        self._in_reach.begin()
         self._report(held)
-        choice = WaypointChoice(motion.position, frame.seen, frame.contacts)
         kept, way, stuck = choice.chosen, 0.0, 0
         while way < length_m and not choice.is_full:
             if self._meets(meet):

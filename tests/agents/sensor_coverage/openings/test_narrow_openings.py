@@ -94,6 +94,23 @@ def test_a_narrow_opening_is_not_passed_by(seed: int, dies: bool, more: tuple[st
             (EXACT, BRIEF),
             id="a chicane of 1.4 bodies, past whose corner a robot sees the walk along a line",
         ),
+        pytest.param(
+            1701, 2, True, (EXACT,), id="a body in a bend of 1.5 bodies, and a jamb in line with a robot behind it"
+        ),
+        pytest.param(
+            1797,
+            1,
+            True,
+            (NOISE, BRIEF),
+            id="noise, a chicane of 1.5 bodies, whose corner hides a way from its station",
+        ),
+        pytest.param(
+            1889,
+            2,
+            True,
+            (EXACT, LIMIT),
+            id="a body in a chicane of 1.9 bodies, and a walk that begins behind its corner",
+        ),
         pytest.param(776, 3, True, (EXACT,), id="a body in a bend of 1.8 bodies beside three robots in line"),
     ],
 )
