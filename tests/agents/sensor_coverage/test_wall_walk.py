@@ -358,6 +358,37 @@ def test_a_robot_that_has_lost_the_wall_goes_back_to_it() -> None:
     assert robot.position[0] > 1.0
 
 
+class BehindCorner(Wedged):
+    """A robot with a wall at its left, which sees another one only where it is less than 0.5 m to the east of it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.frame.contacts = (Touched(math.radians(96.0), None),)
+        self._read(0.0)
+
+    def velocity(self, x_m: float, y_m: float) -> BodyVelocity:
+        self._read(min(0.9, self.position[0] + x_m))
+        return BodyVelocity(x_m, y_m)
+
+    def _read(self, x_m: float) -> None:
+        self.position = self.frame.x_m, self.frame.y_m = x_m, 0.0
+        self.frame.seen = {9: math.pi} if x_m < 0.5 else {}
+
+
+def test_a_walk_that_begins_out_of_sight_reports_where_the_robot_was() -> None:
+    walk = WallWalk(cast(Locomotion, BehindCorner()))
+    for _ in walk.to_wall(0.0, 0.95, 0.3, 1):
+        pass
+    points = list[Waypoint]()
+    walk.on_step = points.append
+    drive = walk.along(-1, 3.0, (9,), (), 0.05)
+    while len(points) < 2:
+        next(drive)
+    assert [(round(each.x_m, 2), each.sees(9)) for each in points[:1]] == [(0.9, False)]
+    assert points[1].sees(9)
+    assert 0.4 < points[1].x_m < 0.5
+
+
 class Passing(Wedged):
     """A robot that moves to the east below a wall, at a robot in the south-east, from which it is `away_m`."""
 
