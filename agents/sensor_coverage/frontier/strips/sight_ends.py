@@ -164,7 +164,9 @@ def edged_arcs(
         kept = without_edges(each, beside.get(stretch, ()))
         found += kept
         if left:
-            parts = united_round(kept)
+            # Where nobody saw how this stretch goes on, its wall ends up to that angle beside the robot, on either side.
+            ends = (Arc(end.direction_rad - AT_WALL_RAD, 2.0 * AT_WALL_RAD) for end in dark.get(stretch, ()))
+            parts = united_round(without_edges(kept, ends))
             left = [edge for edge in left if not is_passed(edge, parts)]
     return united(without_edges(found, left))
 

@@ -185,6 +185,14 @@ def test_a_later_walk_that_goes_on_in_sight_of_a_slot_closes_the_edge_where_an_e
     assert [round(math.degrees(each.direction_rad)) for each in found] == edges
 
 
+@pytest.mark.parametrize(("last", "passes_edge"), [(290, True), (270, False)])
+def test_a_wall_that_nobody_saw_go_on_passes_no_other_edge_close_to_its_end(last: int, passes_edge: bool) -> None:
+    """Seen by a robot in touch, it ends up to 30 degrees beside the direction of the robot."""
+    across = point(_0=215), point(_0=235), point(_0=255), point(_0=last), point()
+    opened = open_at_0((*BEFORE, point()), (point(), *BEYOND), across)
+    assert ((245, 255) not in opened) is passes_edge
+
+
 @pytest.mark.parametrize(("hand", "opened"), [(1, [(330, 150)]), (-1, [(245, 250), (330, 150)])])
 def test_a_wall_close_to_a_slot_ends_where_its_robot_turned_back(hand: int, opened: list[tuple[int, int]]) -> None:
     """With the wall at its right hand the robot moved to the left, and nobody saw how the wall goes on there."""
