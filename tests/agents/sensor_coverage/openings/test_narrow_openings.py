@@ -95,9 +95,6 @@ def test_a_narrow_opening_is_not_passed_by(seed: int, dies: bool, more: tuple[st
             id="a chicane of 1.4 bodies, past whose corner a robot sees the walk along a line",
         ),
         pytest.param(
-            1701, 2, True, (EXACT,), id="a body in a bend of 1.5 bodies, and a jamb in line with a robot behind it"
-        ),
-        pytest.param(
             1797,
             1,
             True,
