@@ -207,7 +207,7 @@ class WallWalks:
 
         A station stands while the robot drives. If a corner hid the robot, the station knows as much as others that saw it.
         """
-        heading, station, origin = self._slots.heading[robot], self._slots.occupant[slot], Origin(slot, walked.start)
+        heading, station = self._slots.heading[robot], self._slots.occupant[slot]
         sees_all = station == robot or all(each.sees(station) for each in walked.waypoints)
         if sees_all:
             near, beside = walked.near.turned(heading), turned_arcs(walked.near_beside, heading)
@@ -216,8 +216,8 @@ class WallWalks:
             self._walls.note_near(slot, near, kind, robot)
             self._walls.note_near(slot, NearWalls(beside), kind, ANYONE)
         if len(walked.waypoints) > 1:
-            way, seen_from = walked.waypoints, origin if sees_all else None
-            number = self._slots.take_walk(robot, hand, way, walked.radius_m, origin=seen_from, moving=moving)
+            way, origin = walked.waypoints, Origin(slot, walked.start) if sees_all else None
+            number = self._slots.take_walk(robot, hand, way, walked.radius_m, origin=origin, moving=moving)
             self.idle = without_witnesses(self.idle, self._slots.walks[number].points)
 
     def axis(self, base: int) -> Routine[Sequence[float]]:

@@ -126,20 +126,20 @@ def still_counting(
     if not gone:
         return passed
     found, edges = list[Passed](), list[tuple[int, float]]()  # the number in `found`, and the direction
-    stretch, lost, ends = -1, False, dict[int, float]()  # the stretch of the point before; where a stretch counts again
+    stretch, lost = -1, False  # of the point before
+    begin: float | None = None  # its direction, if it counts, but not what was followed up to it
     for each in passed:
         counts = gone.isdisjoint(each.point.seen)
         goes_on, there = each.stretch == stretch >= 0, each.point.seen[slot]
         if counts and (each.before is None or gone.isdisjoint(each.before.seen)):
             if goes_on and lost:
-                edges.append((len(found), ends.get(stretch, there)))
+                edges.append((len(found), there if begin is None else begin))
             found.append(each)
             lost = False
         else:
             if goes_on and not lost:
                 edges.append((len(found) - 1, found[-1].point.seen[slot]))
-            ends = {each.stretch: there} if counts else {}
-            lost = True
+            begin, lost = there if counts else None, True
         stretch = each.stretch
     onward = [number for number, each in enumerate(found) if each.goes_on(standing)] if edges else []
     for number, there in edges:

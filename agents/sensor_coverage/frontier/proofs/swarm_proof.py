@@ -270,10 +270,11 @@ class SwarmProof:
     def _candidates(self, pair: Pair) -> dict[int, list[int]]:
         """Return the numbers of the points of the triangles with an edge that count at one of its ends, by side."""
         found: dict[int, list[int]] = {}
+        there = self._views[pair[0]][pair[1]]
         for each in self._passed.get(pair[0], ()):
             counting = self._triangles.pairs(each.number)
             if pair in counting or pair[::-1] in counting:
-                found.setdefault(side_of(each.point, pair[0], self._views[pair[0]][pair[1]]), []).append(each.number)
+                found.setdefault(side_of(each.point, pair[0], there), []).append(each.number)
         return found
 
     def _best(self, pair: Pair, numbers: Sequence[int], opened: Mapping[int, Sequence[Arc]]) -> int:
