@@ -2,8 +2,9 @@
 
 A touch switch does not say what it touches. Along a wall robots stand one behind the other, so the walking robot sees several
 in the sector of a switch. The next steps show which of them is in touch: a robot in touch is one diameter away, and its
-bearing changes as the walking robot passes it. The point of the walk is held back until then. If the bearings of all of them
-change much less, the contact is with a wall: beside a corner a robot may stand far behind the wall's end.
+bearing changes as the walking robot passes it. The point of the walk is held back until then. If a larger distance fits the
+bearings much better, or the robot goes out of sight at once, the contact is not with it: beside a corner a robot may stand
+far behind the wall's end. If so it is with all of them, the contact is with a wall.
 """
 
 import math
@@ -23,9 +24,21 @@ POINTS_MAX: Final = 5
 # One robot is in touch if the bearings of the others are off by this [rad] (root mean square) and by this factor more.
 OFF_RAD: Final = math.radians(9.0)
 OFF_FACTOR: Final = 2.0
-# None of them is in touch if the bearings at so many points are all off by this [rad] (root mean square).
-WALL_RAD: Final = math.radians(20.0)
-WALL_POINTS: Final = 3
+# A robot may be so many diameters away if it is not in touch.
+FAR_DIAMETERS: Final = 2.0, 3.0, 4.5, 7.0, 14.0
+# It is not if its bearings at so many points are off by this [rad] (root mean square), and at such a distance by this part of
+# it. When no more points come, less is enough, but not of fewer points.
+FAR_POINTS: Final = 3
+FAR_RAD: Final = math.radians(8.0)
+FAR_FACTOR: Final = 0.33
+LAST_FAR_RAD: Final = math.radians(6.0)
+LAST_FAR_FACTOR: Final = 0.5
+FEW_FAR_RAD: Final = math.radians(12.0)
+# It is in touch if at these distances they are off by this [rad] and by this factor more.
+NEAR_RAD: Final = math.radians(4.0)
+NEAR_FACTOR: Final = 1.2
+# A robot that is out of sight at so many next points is not in touch.
+LOST_POINTS: Final = 2
 # A bearing shows a distance only if the walking robot moved by this distance [m] across its line of sight: its noise would
 # decide.
 ACROSS_M_MIN: Final = 0.03
@@ -36,32 +49,80 @@ TOUCHING_RADII_MAX: Final = 4.0
 STEPS_MAX: Final = 3
 
 
+class _Candidate(msgspec.Struct):
+    """A robot that may be in touch, in a direction [rad], by its bearings at the next points.
+
+    `errors` are the sums of squared errors [rad²] of these bearings, if it is in touch and if it is farther away
+    (FAR_DIAMETERS). The robot was out of sight at `lost` points before it was seen again.
+    """
+
+    node: int
+    direction_rad: float
+    errors: list[float] = msgspec.field(default_factory=lambda: [0.0] * (1 + len(FAR_DIAMETERS)))
+    seen: int = 0
+    lost: int = 0
+
+    def take(self, moved_m: Vector, bearing_rad: float | None, diameter_m: float) -> None:
+        """Take in its bearing at the next point, if it is in sight there; `moved_m` is the way to that point."""
+        if bearing_rad is None:
+            self.lost += not self.seen
+            return
+        ux, uy = unit(self.direction_rad)
+        self.seen += 1
+        for number, diameters in enumerate((1.0, *FAR_DIAMETERS)):
+            distance_m = diameters * diameter_m
+            expected = math.atan2(distance_m * uy - moved_m[1], distance_m * ux - moved_m[0])
+            self.errors[number] += math.remainder(bearing_rad - expected, math.tau) ** 2
+
+    def is_far(self, is_last: bool) -> bool:
+        """Return whether it is not in touch, by all points, or by those until now."""
+        if not self.seen:
+            return self.lost >= (1 if is_last else LOST_POINTS)
+        is_few = self.seen < FAR_POINTS
+        if is_few and not is_last:
+            return False
+        off, factor = (LAST_FAR_RAD, LAST_FAR_FACTOR) if is_last else (FAR_RAD, FAR_FACTOR)
+        near, far = self.errors[0], min(self.errors[1:])
+        return near > self.seen * (FEW_FAR_RAD if is_few else off) ** 2 and far < factor**2 * near
+
+    def is_near(self) -> bool:
+        """Return whether it is certainly in touch, or a robot as close."""
+        near, far = self.errors[0], min(self.errors[1:])
+        return self.seen >= FAR_POINTS and far > self.seen * NEAR_RAD**2 and far > NEAR_FACTOR**2 * near
+
+
 class _Contact(msgspec.Struct):
     """A contact with one of several robots, or with a wall in the direction `bearing_rad`.
 
-    It has the robot that was supposed, and by robot the sum of squared errors [rad²].
+    `supposed` is the robot that seemed to be in touch.
     """
 
     bearing_rad: float
     supposed: int
-    errors: dict[int, float]
-    points: int = 0
+    candidates: list[_Candidate]
 
-    def touched(self) -> int | None:
-        """Return the robot in touch, if that is certain."""
-        if len(self.errors) == 1:
-            return self.supposed if self.points >= WALL_POINTS and not self.is_wall() else None
-        (best, node), (second, _) = sorted((error, node) for node, error in self.errors.items())[:2]
-        certain = second > self.points * OFF_RAD**2 and second > OFF_FACTOR**2 * best
-        return node if self.points and certain else None
+    def left(self, is_last: bool) -> list[_Candidate]:
+        """Return the robots that may be in touch, by all points, or by those until now."""
+        return [each for each in self.candidates if not each.is_far(is_last)]
 
-    def is_wall(self) -> bool:
+    def touched(self, is_last: bool) -> int | None:
+        """Return the robot in touch, if that is certain, or if it is the only one that is left at the last point."""
+        left = self.left(is_last)
+        if len(left) == 1:
+            return left[0].node if is_last or left[0].is_near() else None
+        if not left or any(not each.seen for each in left):
+            return None
+        best, second = sorted(left, key=lambda each: (each.errors[0] / each.seen, each.node))[:2]
+        off, least = second.errors[0] / second.seen, best.errors[0] / best.seen
+        return best.node if off > OFF_RAD**2 and off > OFF_FACTOR**2 * least else None
+
+    def is_wall(self, is_last: bool) -> bool:
         """Return whether none of the robots is in touch."""
-        return self.points >= WALL_POINTS and min(self.errors.values()) > self.points * WALL_RAD**2
+        return not self.left(is_last)
 
     def is_certain(self) -> bool:
         """Return whether it is certain what is in touch."""
-        return self.is_wall() or self.touched() is not None
+        return self.is_wall(False) or self.touched(False) is not None
 
 
 class TouchedRobots:
@@ -82,10 +143,13 @@ class TouchedRobots:
         """Take in the next point."""
         seen = {each.node: each.bearing_rad for each in point.sightings}
         for at, contacts in self._held:
-            self._compare(at, contacts, point, seen)
+            for contact in contacts:
+                if not contact.is_certain():
+                    for each in contact.candidates:
+                        each.take((point.x_m - at.x_m, point.y_m - at.y_m), seen.get(each.node), self._diameter_m)
         groups = self._uncertain.pop((point.x_m, point.y_m), ())
         contacts = [
-            _Contact(bearing, nodes[0], dict.fromkeys(nodes, 0.0))
+            _Contact(bearing, nodes[0], [_Candidate(node, seen[node]) for node in nodes])
             for bearing, nodes in groups
             if nodes[0] in point.robots and all(node in seen for node in nodes)
         ]
@@ -98,28 +162,15 @@ class TouchedRobots:
         while self._held:
             self._release()
 
-    def _compare(self, at: Waypoint, contacts: Sequence[_Contact], point: Waypoint, seen: dict[int, float]) -> None:
-        """Compare the bearings of robots at a later point with those that they would have in touch with the first."""
-        then = {each.node: each.bearing_rad for each in at.sightings} if contacts else {}
-        for contact in contacts:
-            if contact.is_certain() or any(node not in seen for node in contact.errors):
-                continue
-            contact.points += 1
-            for node in contact.errors:
-                ux, uy = unit(then[node])
-                x_m, y_m = at.x_m + self._diameter_m * ux - point.x_m, at.y_m + self._diameter_m * uy - point.y_m
-                contact.errors[node] += math.remainder(seen[node] - math.atan2(y_m, x_m), math.tau) ** 2
-
     def _release(self) -> None:
         """Report the first point, without contacts that are still uncertain."""
         point, contacts = self._held.popleft()
         for contact in contacts:
-            node = contact.touched()
-            if node is None and len(contact.errors) == 1 and not contact.is_wall():
-                continue  # no other robot is there
+            is_last = not contact.is_certain()
+            node = contact.touched(is_last)
             others = tuple(each for each in point.robots if each != contact.supposed)
             point = msgspec.structs.replace(point, robots=others if node is None else (*others, node))
-            if contact.is_wall():
+            if contact.is_wall(is_last):
                 point = msgspec.structs.replace(point, touched=(*point.touched, contact.bearing_rad))
         self._report(point)
 

@@ -90,3 +90,37 @@ def test_a_contact_with_one_robot_stays_one_if_nothing_shows_how_far_away_it_is(
     assert found == [], "the next points may show it"
     judge.end()
     assert found == [first]
+
+
+def with_robot_at(place: tuple[float, float], way: tuple[tuple[float, float], ...], hidden: int = 0) -> Waypoint:
+    """Return the first point of a way in touch with something in line with robot 7, which is hidden at the next points."""
+    found = list[Waypoint]()
+    judge = TouchedRobots(RADIUS_M, found.append)
+    for number, (x_m, y_m) in enumerate(way):
+        seen = () if 1 <= number <= hidden else (Sighting(7, math.atan2(place[1] - y_m, place[0] - x_m)),)
+        if number == 0:
+            judge.note(x_m, y_m, [(0.0, (7,))])
+        judge.take(Waypoint(x_m, y_m, seen, (), (7,) if number == 0 else ()))
+    judge.end()
+    return found[0]
+
+
+AWAY = (CONTACT, (-0.02, 0.03), (-0.04, 0.06), (-0.06, 0.09), (-0.08, 0.12), (-0.1, 0.15), (-0.12, 0.18))
+
+
+@pytest.mark.parametrize(("distance_m", "robots"), [(0.14, (7,)), (0.6, ())])
+def test_a_robot_that_drives_away_from_a_corner_does_not_take_it_for_a_robot(
+    distance_m: float, robots: tuple[int, ...]
+) -> None:
+    """The bearings of robot 7 are off by less than 20 degrees all the time if it is in touch, or not."""
+    assert with_robot_at((distance_m, 0.0), AWAY).robots == robots
+
+
+@pytest.mark.parametrize(("hidden", "robots"), [(0, (7,)), (2, ())])
+def test_a_robot_that_goes_out_of_sight_at_once_is_not_in_touch(hidden: int, robots: tuple[int, ...]) -> None:
+    assert with_robot_at((0.14, 0.0), AWAY[: 1 + hidden] + AWAY[3:], hidden).robots == robots
+
+
+def test_a_robot_on_another_one_is_in_touch_with_it() -> None:
+    """As the first robot at its station, which it leaves: its bearing turns by more than that of a robot beside it."""
+    assert with_robot_at((0.01, 0.0), AWAY).robots == (7,)
