@@ -12,6 +12,9 @@ from typing import Final
 from zwerm.agents.runtime.contract import Controller, Setup
 from zwerm.agents.sensor_coverage.messages.commands import (
     INCARNATIONS,
+    OPEN,
+    SHUT,
+    STRETCH,
     UPLINK,
     Arrived,
     Cleared,
@@ -50,6 +53,8 @@ from zwerm.wire.messages import BodyVelocity, Command, Observation, Wake
 
 # A robot within this distance [m] of the point where it came out still stands at the exit of the depot.
 HOME_M: Final = 0.05
+# The ends of a probe: at all of them the robot has driven back to its slot.
+PROBE_ENDS: Final = OPEN, SHUT, STRETCH
 
 UPLINK_CODEC: Final = Codec(read_request, write)
 
@@ -133,9 +138,9 @@ class CentralRobot(Controller):
             case ComeBack(cycle, apart):
                 return self._drive(cycle, self._come_back(apart))
             case ToWall(cycle, bearing_rad, hop_m, clear_m, hand, half_rad):
-                return self._walk(cycle, self.wall_walk.to_wall(bearing_rad, hop_m, clear_m, hand, half_rad))
+                return self._walk(cycle, self.wall_walk.to_wall(bearing_rad, hop_m, clear_m, hand, half_rad), (SHUT,))
             case Probe(cycle, bearing_rad, hop_m, hand, half_rad):
-                return self._walk(cycle, self.wall_walk.probe(bearing_rad, hop_m, hand, half_rad))
+                return self._walk(cycle, self.wall_walk.probe(bearing_rad, hop_m, hand, half_rad), PROBE_ENDS)
             case FollowWall(cycle, length_m, hand, keep, meet):
                 margin_m = self.motion.parameters.margin_m
                 return self._walk(cycle, self.wall_walk.along(hand, length_m, keep, meet, margin_m))
@@ -151,10 +156,15 @@ class CentralRobot(Controller):
         way = x - left_x, y - left_y
         self.commands.answer(Arrived(cycle, result.ok, *seen, result.driven_m, result.touched, way))
 
-    def _walk(self, cycle: int, walk: DriveToWalk) -> Drive:
-        """Drive to a wall or along it, and answer with the result."""
+    def _walk(self, cycle: int, walk: DriveToWalk, returns: Collection[str] = ()) -> Drive:
+        """Drive to a wall or along it, and answer with the result.
+
+        At the ends in `returns` the robot has driven back to where it began. If others kept it from there, it goes back later.
+        """
         result = yield from walk
         self.motion.settle()
+        if result.end in returns:
+            self.motion.rest = self.wall_walk.start
         x_m, y_m = self.wall_walk.way
         self.commands.answer(
             Walked(

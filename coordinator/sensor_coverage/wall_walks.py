@@ -211,10 +211,8 @@ class WallWalks:
         sees_all = station == robot or all(each.sees(station) for each in walked.waypoints)
         if sees_all:
             near, beside = walked.near.turned(heading), turned_arcs(walked.near_beside, heading)
-            # A robot that followed the wall and got neither past the arc nor clear has followed all walls around.
-            kind = 0 if walked.end == SHUT else hand
-            self._walls.note_near(slot, near, kind, robot)
-            self._walls.note_near(slot, NearWalls(beside), kind, ANYONE)
+            self._walls.note_near(slot, near, hand, robot)
+            self._walls.note_near(slot, NearWalls(beside), hand, ANYONE)
         if len(walked.waypoints) > 1:
             way, origin = walked.waypoints, Origin(slot, walked.start) if sees_all else None
             number = self._slots.take_walk(robot, hand, way, walked.radius_m, origin=origin, moving=moving)
@@ -308,9 +306,11 @@ class WallWalks:
 
     def _note_passed(self, walk: Walk) -> None:
         """Record the walls close to the slots whose robots a walk has passed, for these robots."""
+        slots = self._slots
         for slot, walls, hand in passed_robots(walk, self._reach_m):
-            if self._slots.occupant.get(slot) == walk.robots[slot]:
-                self._walls.note_near(slot, walls, hand, walk.robots[slot])
+            robot = slots.occupant.get(slot)
+            if robot is not None and slots.stays.number(slot, robot) == walk.stays[slot]:
+                self._walls.note_near(slot, walls, hand, robot)
 
     def keep_idle(self, scan: ScanResult) -> None:
         """Forget idle slots that are empty, and those without which a station sees no others. `scan` has all robots."""

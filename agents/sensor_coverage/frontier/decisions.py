@@ -32,13 +32,13 @@ class CoverageProof(Protocol):
         touched: Mapping[int, Sequence[float]],
         near: Mapping[int, Sequence[NearArc]],
         in_touch: Mapping[int, Collection[int]],
-        occupants: Mapping[int, int],
+        stays: Mapping[int, int],
         touched_by: Mapping[tuple[int, int], Sequence[float]],
     ) -> tuple[int, ...]:
         """Take in a scan, all walks, and by slot the directions [rad] of walls in touch and the arcs of walls close to it.
 
-        `in_touch` has the slots whose robots are in touch, and `occupants` the robots by slot. `touched_by` has the directions
-        of walls in touch of all robots that a slot has had, by slot and robot.
+        `in_touch` has the slots whose robots are in touch, and `stays` the numbers of the robots' stays by slot.
+        `touched_by` has the directions of walls in touch of all stays, by slot and number.
 
         Return the slots around which points of walks count no more, because a slot that saw them is gone.
         """

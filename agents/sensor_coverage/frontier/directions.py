@@ -14,6 +14,8 @@ REFERENCE_WEIGHT = 0.1
 REFERENCE_OFF_RAD = 0.35
 # A robot that stands within this distance [m] of its slot, less than a body's diameter, sees of walls what the former one saw.
 DISPLACED_M_MIN = 0.1
+# It sees the walls close to it in the directions that another robot at its slot found for all robots this close [m] to itself.
+BESIDE_M = 0.05
 # Readings of a heading after which its weight no longer falls.
 HEADING_READINGS_MAX = 20
 # Contacts within this angle [rad] belong to the same wall.

@@ -16,6 +16,7 @@ from operator import itemgetter
 from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.directions import (
+    BESIDE_M,
     DISPLACED_M_MIN,
     Reference,
     add_wall,
@@ -24,6 +25,7 @@ from zwerm.agents.sensor_coverage.frontier.directions import (
     refined_heading,
     refined_reference,
 )
+from zwerm.agents.sensor_coverage.frontier.stays import Pushed, Stays
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     ANYONE,
     Arc,
@@ -37,8 +39,6 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
 )
 from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
 
-# A robot that was pushed this far [m] off its place sees the walls close to it in other directions.
-NEAR_M: Final = 0.03
 NOBODY: Final = -2
 # Length [m] of a leg of a walk that the next leg repeats, so that the wall between them is one stretch.
 JOINED_M: Final = 1.0
@@ -50,9 +50,9 @@ class Slots:
     `occupant` has the robot at each slot. `heading` [rad] and `frame` are each robot's heading and the robot in whose
     frame it is. `view` has the bearings that each robot sees in its own frame. `walls` and `blocked` have, by slot, the
     directions of walls, and of drives that a wall stopped. `touching` has the directions of the walls that the present occupant
-    touches where it stands: another occupant may stand beside an opening. `touched_by` has them for all occupants that the slot
-    ever had, by slot and robot. `near` has the arcs in which a wall close to a slot was followed. `walks` are the walls that
-    robots followed. `length_m` has the distances [m] between slots that are not a hop apart.
+    touches where it stands: another occupant may stand beside an opening. `touched_by` has them for all `stays` of robots that
+    the slot ever had, by slot and number. `near` has the arcs in which a wall close to a slot was followed. `walks` are the
+    walls that robots followed. `length_m` has the distances [m] between slots that are not a hop apart.
     """
 
     def __init__(self) -> None:
@@ -62,6 +62,7 @@ class Slots:
         self.walls: dict[int, list[float]] = {}
         self.blocked: dict[int, list[float]] = {}
         self.touching: dict[int, list[float]] = {}
+        self.stays = Stays(DISPLACED_M_MIN)
         self.touched_by: dict[tuple[int, int], list[float]] = {}
         self.in_touch: dict[int, tuple[int, ...]] = {}  # the robots that the occupant of a slot touches now
         self.near: dict[int, list[NearArc]] = {}
@@ -77,8 +78,6 @@ class Slots:
             tuple[int, int], tuple[int | None, int | None]
         ] = {}  # the robots at both, at the last reading
         self._displaced: dict[int, None] = {}
-        # By slot: the robot, and how far [m] others have pushed it since its way along walls close by counts, and in all.
-        self._pushed: dict[int, tuple[int, tuple[float, float], tuple[float, float]]] = {}
         self._next = 0
 
     # --- slots and occupants ----------------------------------------------------------------------------------------
@@ -121,17 +120,19 @@ class Slots:
         now, robots = list(directions), tuple(robots)
         self.touching[slot], self.in_touch[slot] = now, robots
         if slot in self.occupant:
-            self.touched_by[slot, self.occupant[slot]] = now
+            self.touched_by[slot, self.stays.number(slot, self.occupant[slot])] = now
         walls = self.walls.setdefault(slot, [])
         added = [each for each in now if add_wall(walls, each)]
         return bool(added) or before != (now, robots)
 
     def slots_in_touch(self) -> dict[int, tuple[int, ...]]:
-        """Return by slot the slots of the robots that its occupant touches now."""
+        """Return by slot the slots of the robots that its occupant touches now, and that touch it.
+
+        A robot that stands still names the visible one nearest to the direction of a contact, also one far behind it.
+        """
         slot_of = self.slot_of()
-        return {
-            slot: tuple(slot_of[each] for each in robots if each in slot_of) for slot, robots in self.in_touch.items()
-        }
+        named = {slot: [slot_of[each] for each in robots if each in slot_of] for slot, robots in self.in_touch.items()}
+        return {slot: tuple(each for each in others if slot in named.get(each, ())) for slot, others in named.items()}
 
     def views(self) -> dict[int, dict[int, float]]:
         """Return the directions [rad] of the slots that each slot sees, in its frame."""
@@ -199,9 +200,9 @@ class Slots:
             self.near[slot] = [
                 each._replace(arc=Arc(each.arc.start_rad + by, each.arc.width_rad)) for each in self.near.get(slot, ())
             ]
-        for (slot, robot), contacts in self.touched_by.items():
+        for (slot, stay), contacts in self.touched_by.items():
             if slot in turned:
-                self.touched_by[slot, robot] = [each + by for each in contacts]
+                self.touched_by[slot, stay] = [each + by for each in contacts]
         for (start, end), way in self._ways.items():
             if start in turned:
                 self._ways[start, end] = turned_vector(way, by)
@@ -255,13 +256,14 @@ class Slots:
             for before, each in pairwise(waypoints[:1] + waypoints)
         )
         if origin is not None:
-            origin = Origin(origin.slot, turned_vector(origin.at, heading), self.occupant[origin.slot])
-        robots = {slot: self.occupant[slot] for each in points for slot in each.robots}
+            stay = self.stays.number(origin.slot, self.occupant[origin.slot])
+            origin = Origin(origin.slot, turned_vector(origin.at, heading), stay)
+        touched = self.stays.numbers({slot: self.occupant[slot] for each in points for slot in each.robots})
         if after is not None:
             points = tail(self.walks[after].points, JOINED_M) + points
-            robots |= self.walks[after].robots
+            touched |= self.walks[after].stays
         end = slot_of.get(robot) if stays else None
-        self.walks.append(Walk(frame, hand, points, radius_m, end, origin, robots))
+        self.walks.append(Walk(frame, hand, points, radius_m, end, origin, touched))
         return len(self.walks) - 1
 
     def note_near(self, slot: int, arcs: Sequence[NearArc]) -> None:
@@ -275,35 +277,32 @@ class Slots:
         In a passage they push it on again and again, along its lines of sight to the others. What it saw before closes nothing
         where it stands now: at first that is its own way along walls close to it.
         """
-        if way == (0.0, 0.0):
-            return
-        robot, (x, y), stands = self.occupant[slot], way, (0.0, 0.0)
-        pushed, near, far = self._pushed.get(slot, (robot, stands, stands))
-        if pushed != robot:
-            near = far = stands
-        near, far = (near[0] + x, near[1] + y), (far[0] + x, far[1] + y)
-        if math.hypot(*far) > DISPLACED_M_MIN:
-            near = far = stands
+        pushed = self.stays.push(slot, self.occupant[slot], way)
+        if pushed is Pushed.FAR:
             self._displaced[slot] = None
             self._forget_walls({slot: None})
-        elif math.hypot(*near) > NEAR_M:
-            near = stands
-            if slot in self._near_robot:
-                self._near_robot[slot] = NOBODY
-            if any(each.begins_at(slot) for each in self.walks):
-                self.walks = [each.unseen_by((slot,)) if each.begins_at(slot) else each for each in self.walks]
-        self._pushed[slot] = robot, near, far
+        elif pushed is Pushed.NEAR and slot in self._near_robot:
+            self._near_robot[slot] = NOBODY
 
     def take_replaced(self) -> tuple[int, ...]:
         """Forget the arcs that count for the former robots of slots at which others stand now, and return these slots.
 
-        A robot may stand 0.05 m from where the former one did, and sees a wall 0.1 m away in other directions.
+        A robot may stand 0.05 m from where the former one did, and sees a wall 0.1 m away in other directions. If it stands
+        farther away, what counts for any robot is forgotten, too.
         """
         replaced = tuple(slot for slot, robot in self._near_robot.items() if self.occupant.get(slot) != robot)
         for slot in replaced:
             self.near[slot] = [each for each in self.near.get(slot, ()) if each.robot == ANYONE]
             del self._near_robot[slot]
+        for slot, robot in self.occupant.items():
+            if near := self.near.get(slot):
+                self.near[slot] = [each for each in near if each.robot != ANYONE or self._is_beside(slot, robot, each)]
         return replaced
+
+    def _is_beside(self, slot: int, robot: int, near: NearArc) -> bool:
+        """Return whether the robot at a slot stands beside the one for which an arc was found, as far as is known."""
+        stay = self.stays.number(slot, robot)
+        return near.stay == stay or self.stays.apart_m(near.stay, stay, lambda a: self._distance_m(slot, a)) < BESIDE_M
 
     # --- directions between slots -----------------------------------------------------------------------------------
 
@@ -339,6 +338,8 @@ class Slots:
                         for slot in new:
                             self.near.pop(slot, None)
                 self._readers[a, b] = now
+                self.stays.see(a, b, self.occupant, there)
+                self.stays.see(b, a, self.occupant, back)
                 self._refer(a, b, refined_reference(known, there, back))
         if displaced:
             self._displaced |= displaced

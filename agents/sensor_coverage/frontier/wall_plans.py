@@ -12,7 +12,7 @@ from zwerm.agents.sensor_coverage.frontier.plan import WALLS, Plan, ScanResult
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import united_round
-from zwerm.agents.sensor_coverage.frontier.strips.way_begins import begin_width
+from zwerm.agents.sensor_coverage.frontier.strips.way_begins import begin_width, end_width
 from zwerm.agents.sensor_coverage.frontier.wall_proof import ANYONE, Arc, NearArc, contains
 from zwerm.agents.sensor_coverage.messages.commands import NearArcs, NearWalls
 
@@ -68,9 +68,8 @@ class WallPlans:
         for slot in slots.take_replaced():
             self.probed.pop(slot, None)
         touched = {slot: slots.touching.get(slot, ()) for slot in scan.complex_.vertices}
-        stale = proof.update(
-            scan, slots.walks, touched, slots.near, slots.slots_in_touch(), slots.occupant, slots.touched_by
-        )
+        stays = slots.stays.numbers(slots.occupant)
+        stale = proof.update(scan, slots.walks, touched, slots.near, slots.slots_in_touch(), stays, slots.touched_by)
         displaced = slots.take_displaced()
         for slot in (*stale, *displaced):
             self.tried.pop(slot, None)
@@ -218,10 +217,19 @@ class WallPlans:
     def note_near(self, slot: int, walls: NearWalls, hand: int, robot: int = ANYONE) -> None:
         """Record walls close to a slot that were followed, with a hand at them. They count for the robot (`NearArc`)."""
         begins = [Arc(*each) for each in walls.begins]
-        self._note_arcs(slot, (hand, robot, False), walls.followed, begins)
-        self._note_arcs(slot, (hand, robot, True), walls.past_ends)
+        stay = self._slots.stays.number(slot, self._slots.occupant[slot])
+        past_ends = [Arc(*each) for each in walls.past_ends]
+        self._note_arcs(slot, (hand, robot, False, stay), walls.followed, begins, past_ends)
+        self._note_arcs(slot, (hand, robot, True, stay), walls.past_ends)
 
-    def _note_arcs(self, slot: int, kind: tuple[int, int, bool], arcs: NearArcs, begins: Sequence[Arc] = ()) -> None:
+    def _note_arcs(
+        self,
+        slot: int,
+        kind: tuple[int, int, bool, int],
+        arcs: NearArcs,
+        begins: Sequence[Arc] = (),
+        past_ends: Sequence[Arc] = (),
+    ) -> None:
         """Record arcs (start, width) [rad] around a slot of one kind: its hand, its robot, and whether they are past ends.
 
         Arcs of different walks stay apart: where they meet, a wall may end and another one begin far behind it.
@@ -230,7 +238,13 @@ class WallPlans:
         same = [each.arc for each in known if each.kind == kind]
         fresh = [each for each in united_round(Arc(*each) for each in arcs) if not contains(same, each)]
         kept = [each for each in known if each.kind != kind or not contains(fresh, each.arc)]
-        added = (NearArc(each, *kind, begin_width(each, kind[0], begins)) for each in fresh)
+        hand, robot, is_past_end, stay = kind
+        added = (
+            NearArc(
+                each, hand, robot, is_past_end, begin_width(each, hand, begins), end_width(each, hand, past_ends), stay
+            )
+            for each in fresh
+        )
         self._slots.note_near(slot, [*kept, *added])
 
 

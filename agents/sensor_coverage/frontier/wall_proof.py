@@ -47,6 +47,8 @@ HIDDEN_RAD: Final = math.radians(30.0)
 NEWS_RAD: Final = 0.02
 # A followed wall lies beyond a line of sight if it closes the direction this far [rad] beside it.
 BESIDE_RAD: Final = 0.02
+# Directions [rad] beside a loose edge of sight, or the end of a wall, that the wall does not close.
+BESIDE_EDGE_RAD: Final = math.radians(5.0)
 ANYONE: Final = -1  # any robot at a slot
 # Arcs apart by less than this [rad] are stored as one.
 HAIR_RAD: Final = 1e-9
@@ -72,8 +74,8 @@ class Crossing(NamedTuple):
 class NearArc(NamedTuple):
     """An arc around a slot in which its robot followed a wall close to it, with the wall at its `hand`, +1 left, -1 right.
 
-    The hand is 0 if it followed all walls around. The arc counts for the `robot`, or for ANYONE. Past an end a wall may end.
-    The last `begin_rad` of the arc, at the edge where the robot's way along the wall begins, are beyond the touched point.
+    The arc counts for the `robot`, or for ANYONE. Past an end a wall may end. The last `begin_rad` of the arc, at the edge
+    where the robot's way along the wall begins, are beyond the touched point.
     """
 
     arc: Arc
@@ -81,11 +83,13 @@ class NearArc(NamedTuple):
     robot: int = ANYONE
     is_past_end: bool = False
     begin_rad: float = 0.0
+    end_rad: float = 0.0
+    stay: int = -1
 
     @property
-    def kind(self) -> tuple[int, int, bool]:
-        """The hand, the robot, and whether the arc is past an end."""
-        return self.hand, self.robot, self.is_past_end
+    def kind(self) -> tuple[int, int, bool, int]:
+        """The hand, the robot, whether the arc is past an end, and the stay."""
+        return self.hand, self.robot, self.is_past_end, self.stay
 
 
 class WalkPoint(NamedTuple):
@@ -143,19 +147,19 @@ class WallStep(NamedTuple):
 class Origin(NamedTuple):
     """The slot that a walking robot left, and its place [m] by the robot's odometry, in the frame of the directions.
 
-    `robot` stood there. Another one at the slot stands elsewhere, as far as is known.
+    It was its stay of this number. Another robot at the slot stands elsewhere, as far as is known, and so does this one later.
     """
 
     slot: int
     at: tuple[float, float]
-    robot: int = -1
+    stay: int = -1
 
 
 class Walk(NamedTuple):
     """A stretch of wall that a robot followed, in the frame of one robot; `hand` is +1 if the wall was on the left.
 
     `radius_m` is the radius of its body. `end` is the slot of the walking robot if it stands at the end of the walk. `origin`
-    is the slot that it left, if all points are close to that. `robots` stood at the slots that it touched.
+    is the slot that it left, if all points are close to that. `stays` has the stays of the robots that it touched, by slot.
     """
 
     frame: int
@@ -164,16 +168,12 @@ class Walk(NamedTuple):
     radius_m: float = 0.0
     end: int | None = None
     origin: Origin | None = None
-    robots: Mapping[int, int] = MappingProxyType({})
+    stays: Mapping[int, int] = MappingProxyType({})
 
     def turned(self, frame: int, by: float) -> "Walk":
         """Return the walk in another frame."""
         origin = None if self.origin is None else self.origin._replace(at=turned_vector(self.origin.at, by))
         return self._replace(frame=frame, points=tuple(each.turned(by) for each in self.points), origin=origin)
-
-    def begins_at(self, slot: int) -> bool:
-        """Return whether all points are close to a slot, which the robot left."""
-        return self.origin is not None and self.origin.slot == slot
 
     def way_from_origin(self) -> Iterator[tuple[float, WalkPoint]]:
         """Yield the direction [rad] of each point from the origin by odometry, and the point."""

@@ -257,7 +257,7 @@ def test_a_body_in_a_corner_close_to_the_start_closes_the_arc_to_the_corner_if_i
         walls = tuple(math.radians(degrees) for node, degrees in touch if node is None)
         at_body = not walls
         waypoint = Waypoint(*at, (), walls, (BODY,) if at_body else ())
-        near.expect(NearPoint(at, walls, at_body, at_body), waypoint, at_other=False)
+        near.expect(NearPoint(at, walls, at_body), waypoint, at_other=False)
         held.take(waypoint)
     held.end()
     to_corner = Arc(math.atan2(-0.15 - start[1], 0.18 - start[0]), 0.0)

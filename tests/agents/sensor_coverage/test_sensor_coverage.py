@@ -14,11 +14,13 @@ from zwerm.agents.sensor_coverage.messages.commands import (
     Arrived,
     Correct,
     Deploy,
+    Probe,
     Report,
     Request,
     RobotCommand,
     ScanRequest,
     Sighting,
+    Walked,
     read_response,
     write,
 )
@@ -73,6 +75,7 @@ class OneRobot:
         body = Body("holonomic", 0.07, 0.5, 6.0)
         self.robot = CentralRobot(Setup(1, "robot", 0.1, CentralRobot.sensors, b"0" * 16, body))
         self.neighbour, self.wall_x_m = neighbour, wall_x_m
+        self.behind_x_m = -math.inf  # what keeps it from driving back
         self.x = self.y = 0.0
         self.moved = (0.0, 0.0)
         self.said: list[Answer] = []
@@ -96,7 +99,7 @@ class OneRobot:
         )
         drive = command.drive
         assert isinstance(drive, BodyVelocity)
-        x = min(self.x + 0.1 * drive.forward_m_s, self.wall_x_m - 0.07)
+        x = max(min(self.x + 0.1 * drive.forward_m_s, self.wall_x_m - 0.07), self.behind_x_m)
         self.moved = (x - self.x, 0.1 * drive.left_m_s)
         self.x, self.y = x, self.y + self.moved[1]
         replies = [read_response(each.payload) for each in command.outbox]
@@ -126,6 +129,23 @@ def test_a_test_drive_that_meets_a_wall_leads_back() -> None:
     assert arrived.touched == (0.0,)
     assert arrived.driven_m == pytest.approx(0.43, abs=0.06)
     assert (alone.x, alone.y) == pytest.approx((0.0, 0.0), abs=0.01)
+
+
+def test_a_robot_that_others_keep_from_its_slot_after_a_probe_goes_back_there_later() -> None:
+    alone = OneRobot((-0.9, 0.0), 0.2)
+    for _ in range(30):
+        alone.tick()
+    alone.tick(Probe(1, 0.0, 0.14, 1, 0.1))
+    for _ in range(200):
+        if alone.x > 0.1:
+            alone.behind_x_m = 0.06
+        alone.tick()
+    (walked,) = [each for each in alone.said if isinstance(each, Walked)]
+    assert walked.x_m == alone.x == 0.06
+    alone.behind_x_m = -math.inf
+    for _ in range(10):
+        alone.tick()
+    assert alone.x == pytest.approx(0.0, abs=0.01)
 
 
 def test_a_deployment_that_meets_a_wall_beyond_the_clear_distance_stays_there() -> None:

@@ -29,7 +29,7 @@ def test_probes_at_once_are_of_slots_that_do_not_see_each_other() -> None:
     """A station and five robots in a line. Each robot has one open arc."""
     line = {slot: {each: 0.0 for each in (slot - 1, slot + 1) if 0 <= each < 6} for slot in range(6)}
     scan, slots = ScanResult(line, FlagComplex(line), (0,)), Slots()
-    slots.near = {slot: [NearArc(Arc(0.6, math.tau - 1.2), 0)] for slot in range(6)}
+    slots.near = {slot: [NearArc(Arc(0.6, math.tau - 1.2), 1)] for slot in range(6)}
     walls = WallPlans(PlannerParameters(), slots, SwarmProof())
     assert [plan.mover for plan in walls.probes(scan)] == [1, 3, 5]
     assert [plan.mover for plan in walls.probes(scan)] == [2, 4]

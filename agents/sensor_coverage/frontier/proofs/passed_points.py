@@ -8,13 +8,13 @@ from typing import Final, NamedTuple
 from zwerm.agents.sensor_coverage.frontier.directions import angle_between
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStretch, Pocket, StretchEnd, touched_point
 from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import (
-    BESIDE_EDGE_RAD,
     SightEnd,
     dark_ends_at,
     sight_ends_at,
 )
 from zwerm.agents.sensor_coverage.frontier.strips.stretches import pockets_beside, stretches_of
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
+    BESIDE_EDGE_RAD,
     SAME_WALL_RAD,
     Arc,
     SeenPoint,
@@ -101,8 +101,8 @@ def passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
             there = stretch_of.get(since) if before is not None else None
             ends = () if here is None or there is None else (there.first, here.last)
             beside = pockets_beside(slot, number, walk.points, stretches, walk.hand) if slot in point.robots else ()
-            robot = walk.robots.get(slot, -1)
-            pockets = tuple((first + first_number, each._replace(robot=robot)) for first_number, each in beside)
+            stay = walk.stays.get(slot, -1)
+            pockets = tuple((first + first_number, each._replace(stay=stay)) for first_number, each in beside)
             between = between if before is not None else ()
             edges = tuple(sight_ends_at(slot, number, others, walk.end))
             dark = tuple(dark_ends_at(slot, number, walk.points))

@@ -59,7 +59,7 @@ class SwarmProof:
 
     def _forget(self) -> None:
         self._bases: Collection[int] = ()
-        self._robots: dict[int, int] = {}  # at slots at which walks have begun
+        self._stays: dict[int, int] = {}  # at slots at which walks have begun
         self._neighbours: dict[int, frozenset[int]] = {}
         self._around: dict[int, ArcBasis] = {}
         self._wall_arcs: dict[int, WallArcs] = {}
@@ -76,20 +76,20 @@ class SwarmProof:
         touched: Mapping[int, Sequence[float]],
         near: Mapping[int, Sequence[NearArc]],
         in_touch: Mapping[int, Collection[int]],
-        occupants: Mapping[int, int] = MappingProxyType({}),
+        stays: Mapping[int, int] = MappingProxyType({}),
         touched_by: Mapping[tuple[int, int], Sequence[float]] = MappingProxyType({}),
     ) -> tuple[int, ...]:
         """Take in a scan, all walks, and by slot the directions [rad] of walls in touch and the arcs of walls close to it.
 
-        `in_touch` has the slots whose robots are in touch, and `occupants` the robots by slot. `touched_by` has the directions
-        of walls in touch of all robots that a slot has had, by slot and robot.
+        `in_touch` has the slots whose robots are in touch, and `stays` the numbers of the robots' stays by slot.
+        `touched_by` has the directions of walls in touch of all stays, by slot and number.
 
         Return the slots around which points of walks count no more, because a slot that saw them is gone.
         """
         before = self._neighbours
         self._index(walks)
         self._touched_by = touched_by
-        self._bases, self._robots = scan.bases, self._origins.robots_at(occupants)
+        self._bases, self._stays = scan.bases, self._origins.stays_at(stays)
         complex_ = scan.complex_
         gone = [slot for slot in before if slot not in complex_.neighbours]
         back = [slot for slot in self._gone if slot in complex_.neighbours]
@@ -103,8 +103,8 @@ class SwarmProof:
             if seen.get(slot) != beside:
                 self._versions[slot] = self._versions.get(slot, 0) + 1
             robots = [each for each in in_touch.get(slot, ()) if each in beside]
-            passed, robot = len(self._passed.get(slot, ())), self._robots.get(slot)
-            now = ArcBasis(passed, beside, touched.get(slot, ()), tuple(near.get(slot, ())), robots, robot)
+            passed, stay = len(self._passed.get(slot, ())), self._stays.get(slot)
+            now = ArcBasis(passed, beside, touched.get(slot, ()), tuple(near.get(slot, ())), robots, stay)
             if self._around.get(slot) != now:
                 self._around[slot] = now
                 changed[slot] = None
@@ -316,8 +316,8 @@ class SwarmProof:
         """Return the arcs of a slot that end at followed walls or at contacts."""
         passed = still_counting(slot, self._passed.get(slot, ()), self._gone.keys(), self._neighbours)
 
-        def touched_by(robot: int) -> Sequence[float]:
-            return self._touched_by.get((slot, robot), ())
+        def touched_by(stay: int) -> Sequence[float]:
+            return self._touched_by.get((slot, stay), ())
 
         crossings = self._crossings.setdefault(slot, StepCrossings(slot))
         return find_wall_arcs(passed, self._around[slot], self._neighbours, touched_by, crossings)
@@ -328,7 +328,7 @@ class SwarmProof:
 
     def _valid(self, number: int) -> tuple[Pair, ...]:
         """Return (slot, other slot) for each triangle with the point of this number that counts at the slot."""
-        point = self._origins.standing(number, self._points[number], self._robots)
+        point = self._origins.standing(number, self._points[number], self._stays)
         if not self._counts(point):
             self._triangles.drop(number)
             return ()

@@ -39,14 +39,14 @@ class WalkOrigins:
         self._origins: dict[int, Origin] = {}
         self._slots: dict[int, None] = {}
 
-    def robots_at(self, occupants: Mapping[int, int]) -> dict[int, int]:
-        """Return the robots at the slots at which walks have begun."""
-        return {slot: occupants[slot] for slot in self._slots if slot in occupants}
+    def stays_at(self, stays: Mapping[int, int]) -> dict[int, int]:
+        """Return the stays at the slots at which walks have begun."""
+        return {slot: stays[slot] for slot in self._slots if slot in stays}
 
-    def standing(self, number: int, point: WalkPoint, robots: Mapping[int, int]) -> WalkPoint:
-        """Return a point as if its origin had not seen it, if another robot stands there now."""
+    def standing(self, number: int, point: WalkPoint, stays: Mapping[int, int]) -> WalkPoint:
+        """Return a point as if its origin had not seen it, if another stay has begun there."""
         origin = self._origins.get(number)
-        if origin is None or robots.get(origin.slot) == origin.robot:
+        if origin is None or stays.get(origin.slot) == origin.stay:
             return point
         return point.unseen_by((origin.slot,))
 

@@ -13,8 +13,8 @@ from zwerm.agents.sensor_coverage.frontier.strips.crossings import (
 )
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import Pocket
 from zwerm.agents.sensor_coverage.frontier.strips.robots_in_touch import BODY_RAD
-from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import SightEnd, beside_edge, edged_arcs, shortened
-from zwerm.agents.sensor_coverage.frontier.strips.way_begins import between_begins
+from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import SightEnd, beside_edge, edged_arcs
+from zwerm.agents.sensor_coverage.frontier.strips.way_begins import between_begins, certain_arcs
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     CONTACT_RAD,
     Arc,
@@ -40,7 +40,7 @@ class ArcBasis(NamedTuple):
     touched: Sequence[float]
     near: Sequence[NearArc]
     in_touch: Sequence[int]
-    robot: int | None
+    stay: int | None
 
 
 class WallArcs(NamedTuple):
@@ -122,7 +122,7 @@ def find_wall_arcs(
             if not each.is_seen(standing):
                 (dark if each.is_loose(standing) else aside).setdefault(stretch, []).append(each)
         for first_number, pocket in passed.pockets:
-            contacts += arcs_beside_pocket(hand, pocket, touched_by(pocket.robot))
+            contacts += arcs_beside_pocket(hand, pocket, touched_by(pocket.stay))
             if pocket.in_touch or (first_number, pocket.is_last) not in beside:
                 beside[first_number, pocket.is_last] = hand, pocket
     for (first_number, _), (hand, pocket) in beside.items():
@@ -130,10 +130,11 @@ def find_wall_arcs(
         crossings.setdefault(first_number, []).extend(crossings_of_pocket(hand, pocket, is_loose))
     near = between_begins(basis.near)
     by_stretch = {number: arcs_into(each) for number, each in crossings.items()}
-    edged = strict = edged_arcs(by_stretch, edges, contacts, shortened(near), dark)
+    certain = certain_arcs(basis.near)
+    edged = strict = edged_arcs(by_stretch, edges, contacts, certain, dark)
     if aside:
         loose = {each: [*dark.get(each, ()), *aside.get(each, ())] for each in (*dark, *aside)}
-        strict = edged_arcs(by_stretch, edges, contacts, shortened(near), loose)
+        strict = edged_arcs(by_stretch, edges, contacts, certain, loose)
     found = (*contacts, *(each.arc for each in near), *(arc for each in by_stretch.values() for arc in each))
     return WallArcs(united(found), edged, by_stretch, strict, list(_answered(by_stretch, aside, standing)))
 

@@ -46,8 +46,8 @@ class Pocket(NamedTuple):
 
     `is_last` is true for the last point of the stretch. The walking robot touched the standing robot there if it is `in_touch`,
     else a few points away, without a wall in touch. `before` is the last end of the stretch before. `end_rad` is the direction
-    [rad] in which the standing robot saw the walking one at the end, if it did. `robot` is the standing robot, if it is
-    known: another one at its slot stands elsewhere, and may touch other walls.
+    [rad] in which the standing robot saw the walking one at the end, if it did. `stay` is the number of the standing robot's
+    stay, if it is known: in another one a robot at the slot stands elsewhere, and may touch other walls.
     """
 
     end: StretchEnd
@@ -58,7 +58,7 @@ class Pocket(NamedTuple):
     in_touch: bool
     before: StretchEnd | None = None
     end_rad: float | None = None
-    robot: int = -1
+    stay: int = -1
 
 
 class FollowedStretch(NamedTuple):

@@ -14,9 +14,9 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.wall_proof import (
+    BESIDE_EDGE_RAD,
     HAIR_RAD,
     Arc,
-    NearArc,
     WalkPoint,
     complement,
     contains,
@@ -24,8 +24,6 @@ from zwerm.agents.sensor_coverage.frontier.wall_proof import (
     united,
 )
 
-# Directions [rad] beside a loose edge that its stretch of wall does not close.
-BESIDE_EDGE_RAD: Final = math.radians(5.0)
 # A wall that a robot touches ends up to this angle [rad] beside the direction of the robot: as seen by a robot in touch.
 AT_WALL_RAD: Final = math.radians(30.0)
 # Edges closer [rad] are one.
@@ -169,18 +167,6 @@ def edged_arcs(
             parts = united_round(without_edges(kept, ends))
             left = [edge for edge in left if not is_passed(edge, parts)]
     return united(without_edges(found, left))
-
-
-def shortened(near: Iterable[NearArc]) -> list[Arc]:
-    """Return arcs of walls close to a slot without the directions beside their ends: nobody saw how these walls go on.
-
-    With the wall at the left hand, a robot that comes from the slot follows it to the right.
-    """
-    return [
-        Arc(arc.start_rad + max(hand, 0) * BESIDE_EDGE_RAD, arc.width_rad - abs(hand) * BESIDE_EDGE_RAD)
-        for arc, hand, _, is_past_end, _ in near
-        if not is_past_end and arc.width_rad > abs(hand) * BESIDE_EDGE_RAD
-    ]
 
 
 def within_ends(arc: Arc) -> Arc:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import chain, combinations, dropwhile, pairwise
 from typing import Final, NamedTuple
 
-from zwerm.agents.sensor_coverage.frontier.directions import angle_between
+from zwerm.agents.sensor_coverage.frontier.directions import BESIDE_M, angle_between
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import (
     StretchEnd,
     direction_of,
@@ -34,8 +34,7 @@ NEAR_M_MIN: Final = 0.02
 # as a body differ by 150 degrees or more, as two switches show them. So do those of a wedge, but there the robot turns back.
 CORNER_RAD: Final = math.radians(125.0)
 WEDGE_RAD: Final = math.radians(175.0)
-# Another robot at a slot may stand this far [m] from the former one. The arcs of so many places on that circle are compared.
-BESIDE_M: Final = 0.05
+# The arcs of so many places are compared at which another robot may stand (`BESIDE_M`).
 PLACES: Final = 8
 # A way shorter than this [m] leads nowhere: the robot is wedged.
 WEDGED_M: Final = 0.005
@@ -53,12 +52,11 @@ SWEPT: Final = 2.0
 class NearPoint(NamedTuple):
     """A point [m] of the way along a wall close to the start, and the directions of touched walls [rad].
 
-    `at_body` is true if a dead robot is in touch, and `at_robot` if any robot is but the one at the start.
+    `at_robot` is true if a robot is in touch, dead or not, but for the one that stands at the start.
     """
 
     at: Vector
     walls: tuple[float, ...]
-    at_body: bool = False
     at_robot: bool = False
 
 
@@ -138,7 +136,7 @@ class NearPoints:
         """Take in the next waypoint, and report it. Where it is not the same as before, the bodies count as wall."""
         near, before, at_other = self._waiting.popleft()
         if (point.touched, point.robots) != (before.touched, before.robots):
-            near = near._replace(walls=point.touched, at_body=False, at_robot=at_other)
+            near = near._replace(walls=point.touched, at_robot=at_other)
         self.way.take(near)
         self._report(point)
 
@@ -163,7 +161,7 @@ def walls_around(start: Vector, way: FollowedWay) -> NearWalls:
     the start (`frontier.strips.crossings`). What is beyond is past an end, except where the way begins: the robot meets the
     same wall there with its other hand. Two successive contacts with the same wall close the arc
     between the touched points of the wall. So do two contacts at the same point, because a body does not pass between them:
-    those of a corner, or of a wedge from which the robot turned back. A dead robot may fill an opening: from there on only
+    those of a corner, or of a wedge from which the robot turned back. A robot may fill an opening: from there on only
     the same wall closes an arc, up to the next wall. A step from one wall to the opposite one closes nothing.
     """
     stretches = list(_stretches(way))
@@ -188,13 +186,13 @@ def _stretches(way: FollowedWay) -> Iterator[_Stretch]:
             contacts = [(points[number].at, points[number].walls) for number in touching]
             yield _Stretch(touching[0], touching[-1], ends_of_stretch(contacts, hand, radius_m), is_clear)
 
-    at_body, begins_clear = False, False
+    past_robot, begins_clear = False, False
     first: int | None = None
     for number, (before, point) in enumerate(pairwise(points)):
-        at_body = before.at_body or (at_body and not before.walls)
+        past_robot = before.at_robot or (past_robot and not before.walls)
         leaves = leaves_wall(hand, before.walls, point.walls, point.at[0] - before.at[0], point.at[1] - before.at[1])
-        past_body = (before.walls or point.walls) and not (at_body or point.at_body)
-        if not leaves and (past_body or any(_same_walls(before, point))):
+        is_beside = (before.walls or point.walls) and not (past_robot or point.at_robot)
+        if not leaves and (is_beside or any(_same_walls(before, point))):
             if first is None:
                 first, begins_clear = number, not before.at_robot
         elif first is not None:

@@ -36,7 +36,7 @@ def passed_robots(walk: Walk, reach_m: float) -> Iterator[PassedRobot]:
 
     Points count up to the first one farther from the robot than `reach_m`.
     """
-    for slot in walk.robots:
+    for slot in walk.stays:
         for first, last in _contacts(walk.points, slot):
             met = walk.points[first]
             place = place_of_robot(met.at, met.seen[slot], walk.radius_m)
@@ -91,5 +91,4 @@ def _may_see(place: Vector, point: WalkPoint, slot: int, radius_m: float) -> boo
 
 def _near_point(point: WalkPoint, slot: int) -> NearPoint:
     """Return a point of a walk as one of a way close to the robot of a slot."""
-    at_body = point.at_body or any(other != slot for other in point.robots)
-    return NearPoint(point.at, point.walls, at_body, at_body)
+    return NearPoint(point.at, point.walls, point.at_body or any(other != slot for other in point.robots))

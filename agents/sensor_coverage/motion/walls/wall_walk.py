@@ -346,7 +346,7 @@ class WallWalk:
         back_rad = math.atan2(-y, -x)
         robots = [each for each in frame.contacts if each.node is not None]
         beside = [each for each in robots if angle_between(each.bearing_rad, back_rad) > ROBOT_BEHIND_RAD]
-        near = NearPoint(self._motion.position, frame.touched, self._bodies.in_touch, bool(beside))
+        near = NearPoint(self._motion.position, frame.touched, self._bodies.in_touch or bool(beside))
         points.expect(near, point, any(not self._bodies.is_body(each.node) for each in beside))
 
     def _waypoint(self) -> Waypoint:

@@ -114,6 +114,6 @@ def test_walks_go_into_narrow_arcs_only_where_no_slot_has_a_wide_one(
     slots, views = Slots(), {0: {1: 0.0}, 1: {0: math.pi}}
     for slot, width_rad in enumerate(closed_rad):
         slots.add(slot)
-        slots.near[slot] = [NearArc(Arc(0.1, width_rad), 0)] if width_rad else []
+        slots.near[slot] = [NearArc(Arc(0.1, width_rad), 1)] if width_rad else []
     walls = WallPlans(PlannerParameters(), slots, SwarmProof())
     assert {each.mover for each in walls.plans(ScanResult(views, FlagComplex(views), ()))} == movers

@@ -6,7 +6,7 @@ from itertools import pairwise
 import pytest
 
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
-from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, Origin, Walk, WalkPoint
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, Walk, WalkPoint
 from zwerm.agents.sensor_coverage.messages.pushes import ReferenceBearing
 from zwerm.agents.sensor_coverage.neighbourhood.references import Displaced, References
 
@@ -67,13 +67,13 @@ def test_what_a_slot_saw_of_walls_falls_when_others_push_its_robot_on(
     pushes: list[float], left: int, seen: bool
 ) -> None:
     slots = three_slots()
-    slots.walks.append(Walk(10, 1, (WalkPoint({1: 0.5, 2: 1.5}, (0.0,), ()),), origin=Origin(1, (0.0, 0.0), 11)))
+    stay = slots.stays.number(1, 11)
     slots.note_near(1, [NearArc(Arc(0.0, 1.0), 1, 11), NearArc(Arc(0.0, 0.5), 1)])
     for each in pushes:
         slots.note_push(1, (each, 0.0))
     slots.take_replaced()
     assert len(slots.near.get(1, ())) == left
-    assert (1 in slots.walks[1].points[0].seen) is seen
+    assert (slots.stays.number(1, 11) == stay) is seen
     assert (1 in slots.walks[0].points[0].seen) is (slots.take_displaced() == ())
 
 

@@ -426,8 +426,8 @@ def test_walks_turn_with_the_frame_in_which_they_were_seen() -> None:
     slots.orient(8, 7, 0.5)
     slots.take_walk(8, 1, (Waypoint(0.0, 0.0, (Sighting(7, 0.25),), (1.0,), (7,)),))
     there, later = WalkPoint({0: 0.75 + math.pi}, (1.5,), (0,)), WalkPoint({0: 1.75 + math.pi}, (2.5,), (0,))
-    assert slots.walks[1] == Walk(7, 1, (there,), robots={0: 7})
-    assert slots.walks[1].turned(3, 1.0) == Walk(3, 1, (later,), robots={0: 7})
+    assert slots.walks[1] == Walk(7, 1, (there,), stays={0: 1})
+    assert slots.walks[1].turned(3, 1.0) == Walk(3, 1, (later,), stays={0: 1})
 
 
 def test_a_walking_robot_remembers_that_it_touched_a_robot_without_a_slot() -> None:

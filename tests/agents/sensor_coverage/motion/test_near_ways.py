@@ -9,11 +9,13 @@ from collections.abc import Iterable
 import pytest
 
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
+from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.proofs.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import united_round
+from zwerm.agents.sensor_coverage.frontier.wall_plans import WallPlans
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, Origin, Walk, contains, turned_vector
-from zwerm.agents.sensor_coverage.messages.commands import Sighting, Waypoint
+from zwerm.agents.sensor_coverage.messages.commands import NearWalls, Sighting, Waypoint
 from zwerm.agents.sensor_coverage.motion.walls.near_arcs import (
     FollowedWay,
     NearPoint,
@@ -117,7 +119,7 @@ def open_at_slot(
         waypoints.append(Waypoint(x, y, seen, walls, (), back))
     slots.take_walk(0, -1, waypoints, RADIUS_M, origin=None if origin is None else Origin(origin, SLOT))
     proof = SwarmProof()
-    proof.update(scan, slots.walks, {}, {0: near_arcs(way)}, {}, {0: robot_then, 1: 1})
+    proof.update(scan, slots.walks, {}, {0: near_arcs(way)}, {}, slots.stays.numbers({0: robot_then, 1: 1}))
     return proof.open_arcs().get(0, [])
 
 
@@ -132,6 +134,45 @@ def test_a_way_close_to_a_slot_closes_the_triangle_with_a_robot_that_sees_it() -
 
 def test_what_a_robot_saw_of_its_way_counts_while_it_stands_there() -> None:
     assert is_closed(open_at_slot(origin=0, robot_then=5), 160.0)
+
+
+@pytest.mark.parametrize("at_robot", [True, False])
+def test_a_robot_that_a_way_leads_round_may_fill_an_opening(at_robot: bool) -> None:
+    """The way leads from a corner, with the right hand, to the opposite wall of a passage: round a robot in its mouth."""
+    corner, opposite = (math.radians(-75.0),), (math.radians(60.0),)
+    points = [
+        NearPoint((0.06, 0.04), corner),
+        NearPoint((0.1, 0.074), corner),
+        NearPoint((0.15, 0.083), (), at_robot),
+        *(NearPoint((0.17 - 0.04 * each, 0.13 + 0.01 * each), opposite) for each in range(4)),
+    ]
+    closed = [Arc(*each) for each in walls_around(SLOT, FollowedWay(points, -1, RADIUS_M)).followed]
+    assert is_open_at(closed, 38.0) is at_robot
+    assert not is_open_at(closed, 58.0)
+
+
+@pytest.mark.parametrize(
+    ("off_deg", "other_moves", "left"),
+    [
+        pytest.param(4.0, False, 1, id="0.04 m beside it"),
+        pytest.param(8.0, False, 0, id="0.08 m beside it"),
+        pytest.param(8.0, True, 1, id="the other slot has another robot, too: nobody knows which one moved"),
+    ],
+)
+def test_what_counts_for_any_robot_at_a_slot_is_forgotten_when_one_stands_far_beside_it(
+    off_deg: float, other_moves: bool, left: int
+) -> None:
+    slots = Slots()
+    for robot in (7, 8):
+        slots.add(robot)
+    slots.length_m[0, 1] = slots.length_m[1, 0] = 0.6
+    for turn, robots in ((0.0, (7, 8)), (math.radians(off_deg), (7, 9) if not other_moves else (5, 9))):
+        slots.occupant |= dict(enumerate(robots))
+        slots.learn_references({0: {1: turn}, 1: {0: math.pi + turn}})
+        if not turn:
+            WallPlans(PlannerParameters(), slots, None).note_near(1, NearWalls(((0.2, 0.6),)), 1)
+    slots.take_replaced()
+    assert len(slots.near[1]) == left
 
 
 def test_another_robot_at_a_slot_does_not_know_the_walls_close_to_it() -> None:

@@ -32,7 +32,7 @@ def walk_past(left_at: int = -1) -> Walk:
         there = {SLOT: math.atan2(y - PLACE[1], x - PLACE[0])}
         robots = (SLOT,) if around else ()
         points.append(WalkPoint(there, SOUTH if at_wall else (), robots, left_walls=number == left_at, at=(x, y)))
-    return Walk(0, -1, tuple(points), RADIUS_M, robots={SLOT: 8})
+    return Walk(0, -1, tuple(points), RADIUS_M, stays={SLOT: 8})
 
 
 def closed(walk: Walk, reach_m: float = 0.95) -> tuple[bool, ...]:

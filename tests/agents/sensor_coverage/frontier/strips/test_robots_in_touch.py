@@ -7,6 +7,7 @@ import pytest
 
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.frontier.proofs.swarm_proof import SwarmProof
+from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, Walk, WalkPoint
 from zwerm.maths.simplicial import FlagComplex
 
@@ -17,9 +18,18 @@ SCAN = ScanResult(VIEWS, FlagComplex(VIEWS), ())
 APART_DEG = 360 - 50 - 90
 
 
+def test_robots_are_in_touch_if_each_of_them_touches_the_other() -> None:
+    """Robot 7 touches a robot without a slot, and names robot 8, which stands far behind that one."""
+    slots = Slots()
+    for robot, touched in ((7, (8, 20)), (8, (9,)), (9, (8,))):
+        slots.touch(slots.add(robot), (), touched)
+    assert slots.slots_in_touch() == {0: (), 1: (2,), 2: (1,)}
+
+
 def update(proof: SwarmProof, wall_deg: int, *near_deg: tuple[int, int]) -> None:
     """Take in that slot 0 touches a wall in a direction, and the arcs (start, width) of walls close to slot 1."""
-    near = [NearArc(Arc(math.radians(start), math.radians(width)), 0) for start, width in near_deg]
+    hand = 1 if wall_deg > 0 else -1
+    near = [NearArc(Arc(math.radians(start), math.radians(width)), hand) for start, width in near_deg]
     proof.update(SCAN, (), {0: [math.radians(wall_deg)]}, {1: near}, {0: (1,), 1: (0,)})
 
 

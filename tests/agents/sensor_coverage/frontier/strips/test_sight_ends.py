@@ -11,13 +11,13 @@ from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import (
     SightEnd,
     beside_edge,
     dark_ends_at,
-    shortened,
     sight_ends_at,
     united_round,
     with_islands,
     without_edges,
 )
 from zwerm.agents.sensor_coverage.frontier.strips.stretches import stretches_of
+from zwerm.agents.sensor_coverage.frontier.strips.way_begins import certain_arcs
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, Walk, WalkPoint
 from zwerm.maths.simplicial import FlagComplex
 
@@ -284,7 +284,7 @@ def test_a_slot_answers_for_what_is_between_two_walls_if_it_closes_that(
     before = (*BEFORE[:-1], BEFORE[-1]._replace(seen={**BEFORE[-1].seen, **beside[0]}))
     beyond = (BEYOND[0]._replace(seen={**BEYOND[0].seen, **beside[1]}), *BEYOND[1:])
     walk = Walk(0, -1, (*before, AT_BODY, *(each._replace(walls=(math.pi,)) for each in beyond)))
-    proof, near = SwarmProof(), {0: (NearArc(arc(330, 510), 0),), 1: (NearArc(closed, 0),)}
+    proof, near = SwarmProof(), {0: (NearArc(arc(325, 510), 1),), 1: (NearArc(closed, 1),)}
     proof.update(SCAN, [walk], {}, near, {})
     assert {slot: degrees(arcs) for slot, arcs in proof.open_arcs().items()} == opened
 
@@ -335,15 +335,15 @@ def test_the_end_of_the_wall_beside_the_robot_that_followed_it_is_an_edge_of_sig
 
 
 def test_an_arc_close_to_a_slot_that_is_narrower_than_an_edge_is_left_out() -> None:
-    near = NearArc(arc(0, 4), 1), *(NearArc(arc(0, 40), hand) for hand in (1, -1, 0))
-    assert degrees(shortened(near)) == [(5, 40), (0, 35), (0, 40)]
+    near = NearArc(arc(0, 4), 1), *(NearArc(arc(0, 40), hand) for hand in (1, -1)), NearArc(arc(0, 360), 1)
+    assert degrees(certain_arcs(near)) == [(5, 40), (0, 35), (0, 0)]
 
 
 def test_what_is_past_the_end_of_a_wall_close_to_a_slot_closes_no_edge() -> None:
-    arcs = NearArc(arc(0, 40), 0), NearArc(arc(40, 50), 0, is_past_end=True)
-    assert degrees(shortened(arcs)) == [(0, 40)]
-    assert open_at_0(BEYOND, near=(NearArc(arc(150, 245), 0), NearArc(arc(245, 250), 0, is_past_end=True))) == [
-        (330, 150),
+    arcs = NearArc(arc(-5, 40), 1), NearArc(arc(40, 50), 1, is_past_end=True)
+    assert degrees(certain_arcs(arcs)) == [(0, 40)]
+    assert open_at_0(BEYOND, near=(NearArc(arc(145, 245), 1), NearArc(arc(245, 250), 1, is_past_end=True))) == [
+        (330, 145),
         (245, 250),
     ]
 

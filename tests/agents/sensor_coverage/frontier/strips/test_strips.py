@@ -149,7 +149,7 @@ def test_between_two_contacts_that_no_opening_fits_between_all_is_closed() -> No
 
     Another robot at the slot may stand 0.09 m away, and touch the other side of a passage there.
     """
-    walk = tied(way_to(math.radians(5.0)))._replace(robots={0: 8})
+    walk = tied(way_to(math.radians(5.0)))._replace(stays={0: 8})
     assert closed_ranges(proof_of(walk, (0, 1), (-90.0,), 8)) == [(-135, 1)]
     assert closed_ranges(proof_of(walk, (0, 1), (-90.0,), 9)) == [(-40, -45), (-135, 1)]
 

@@ -7,7 +7,7 @@ import pytest
 from zwerm.agents.sensor_coverage.frontier.planner_parameters import PlannerParameters
 from zwerm.agents.sensor_coverage.frontier.proofs.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
-from zwerm.agents.sensor_coverage.frontier.strips.way_begins import begin_width, between_begins
+from zwerm.agents.sensor_coverage.frontier.strips.way_begins import begin_width, between_begins, certain_arcs, end_width
 from zwerm.agents.sensor_coverage.frontier.wall_plans import WallPlans
 from zwerm.agents.sensor_coverage.frontier.wall_proof import ANYONE, Arc, NearArc
 from zwerm.agents.sensor_coverage.motion.walls.near_arcs import NearPoint, NearWay
@@ -53,12 +53,40 @@ def test_only_what_is_between_the_begins_of_two_ways_counts_beyond_them(near: li
     )
 
 
+@pytest.mark.parametrize(
+    ("near", "certain"),
+    [
+        pytest.param([way(0, -1)], [(9, 45)], id="one hand: it may have touched the wall up to 9 degrees further on"),
+        pytest.param([way(0, -1), way(13, 1)], [(0, 45), (-32, 13), (-32, 45)], id="both hands, from one point"),
+        pytest.param([way(0, -1), way(30, 1)], [(9, 45), (-15, 21)], id="both hands, from two points"),
+        pytest.param(
+            [way(0, -1)._replace(end_rad=math.radians(8.0))], [(9, 42)], id="the wall may end 8 degrees before"
+        ),
+        pytest.param([way(0, -1)._replace(is_past_end=True)], [], id="past an end"),
+    ],
+)
+def test_a_wall_certainly_goes_on_from_where_it_was_touched_to_where_it_was_left(
+    near: list[NearArc], certain: list[tuple[int, int]]
+) -> None:
+    found = certain_arcs(near)
+    assert [
+        (round(math.degrees(math.remainder(start, math.tau))), round(math.degrees(start + width)))
+        for start, width in found
+    ] == certain
+
+
 def test_the_part_beyond_the_begin_is_known_by_the_edge_of_an_arc() -> None:
     beyond = [Arc(math.radians(-9.0), math.radians(9.0))]
     assert begin_width(Arc(math.radians(351.0), 1.0), -1, beyond) == math.radians(9.0)
     assert begin_width(Arc(math.radians(-9.0), 1.0), 1, beyond) == 0.0
     assert begin_width(Arc(math.radians(-20.0), math.radians(20.0)), 1, beyond) == math.radians(9.0)
-    assert begin_width(Arc(math.radians(-9.0), 1.0), 0, beyond) == 0.0
+
+
+def test_the_part_past_the_end_of_a_way_follows_its_arc() -> None:
+    past = [Arc(math.radians(-9.0), math.radians(9.0))]
+    assert end_width(Arc(0.0, 1.0), 1, past) == math.radians(9.0)
+    assert end_width(Arc(0.0, 1.0), -1, past) == 0.0
+    assert end_width(Arc(math.radians(-69.0), math.radians(60.0)), -1, past) == math.radians(9.0)
 
 
 def test_the_ways_round_both_sides_of_a_jamb_close_nothing_before_it() -> None:
