@@ -6,7 +6,7 @@ to the left.
 
 import cmath
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 # Weight of a new reading in the reference direction between two slots, once several readings are averaged.
 REFERENCE_WEIGHT = 0.1
@@ -16,6 +16,8 @@ REFERENCE_OFF_RAD = 0.35
 DISPLACED_M_MIN = 0.1
 # It sees the walls close to it in the directions that another robot at its slot found for all robots this close [m] to itself.
 BESIDE_M = 0.05
+# A robot names the visible one nearest to the direction of a contact. It may touch another one within this angle [rad].
+FACED_RAD = math.radians(30.0)
 # Readings of a heading after which its weight no longer falls.
 HEADING_READINGS_MAX = 20
 # Contacts within this angle [rad] belong to the same wall.
@@ -28,6 +30,15 @@ Reference = tuple[complex, int]
 def angle_between(a_rad: float, b_rad: float) -> float:
     """Return the absolute angle [rad] between two directions, in [0, pi]."""
     return abs(math.remainder(a_rad - b_rad, math.tau))
+
+
+def faced(view: Mapping[int, float], touched: Iterable[int]) -> tuple[int, ...]:
+    """Return the robots in a view [rad] that a robot may touch; it names `touched`, each the nearest to a contact's direction.
+
+    So it may name a robot far behind the one that it touches.
+    """
+    named = [view[each] for each in touched if each in view]
+    return tuple(node for node, there in view.items() if any(angle_between(there, each) < FACED_RAD for each in named))
 
 
 def wrapped(angle_rad: float) -> float:

@@ -11,6 +11,7 @@ frame of one robot, at first the robot's own. Two frames that meet become one.
 import cmath
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from itertools import pairwise
 from operator import itemgetter
 from typing import Final
@@ -20,6 +21,7 @@ from zwerm.agents.sensor_coverage.frontier.directions import (
     DISPLACED_M_MIN,
     Reference,
     add_wall,
+    faced,
     is_beside,
     is_displaced,
     refined_heading,
@@ -126,13 +128,13 @@ class Slots:
         return bool(added) or before != (now, robots)
 
     def slots_in_touch(self) -> dict[int, tuple[int, ...]]:
-        """Return by slot the slots of the robots that its occupant touches now, and that touch it.
-
-        A robot that stands still names the visible one nearest to the direction of a contact, also one far behind it.
-        """
-        slot_of = self.slot_of()
-        named = {slot: [slot_of[each] for each in robots if each in slot_of] for slot, robots in self.in_touch.items()}
-        return {slot: tuple(each for each in others if slot in named.get(each, ())) for slot, others in named.items()}
+        """Return by slot the slots of the robots that its occupant touches now, if these touch a robot in its direction."""
+        slot_of, here = self.slot_of(), self.occupant
+        facing = {each: faced(self.view.get(each, {}), self.in_touch.get(slot, ())) for each, slot in slot_of.items()}
+        return {
+            slot: tuple(slot_of[each] for each in robots if here.get(slot) in facing.get(each, ()))
+            for slot, robots in self.in_touch.items()
+        }
 
     def views(self) -> dict[int, dict[int, float]]:
         """Return the directions [rad] of the slots that each slot sees, in its frame."""
@@ -295,14 +297,13 @@ class Slots:
             self.near[slot] = [each for each in self.near.get(slot, ()) if each.robot == ANYONE]
             del self._near_robot[slot]
         for slot, robot in self.occupant.items():
-            if near := self.near.get(slot):
-                self.near[slot] = [each for each in near if each.robot != ANYONE or self._is_beside(slot, robot, each)]
+            near, now = self.near.get(slot, ()), self.stays.number(slot, robot)
+            noted = dict.fromkeys(each.stay for each in near if each.stay != now)
+            if far := [
+                each for each in noted if self.stays.apart_m(each, now, partial(self._distance_m, slot)) >= BESIDE_M
+            ]:
+                self.near[slot] = [each for each in near if each.robot != ANYONE or each.stay not in far]
         return replaced
-
-    def _is_beside(self, slot: int, robot: int, near: NearArc) -> bool:
-        """Return whether the robot at a slot stands beside the one for which an arc was found, as far as is known."""
-        stay = self.stays.number(slot, robot)
-        return near.stay == stay or self.stays.apart_m(near.stay, stay, lambda a: self._distance_m(slot, a)) < BESIDE_M
 
     # --- directions between slots -----------------------------------------------------------------------------------
 

@@ -75,7 +75,13 @@ def test_a_robot_that_probes_is_no_witness_of_another_probe(noise_rad: float, mo
         if counted > 20 and at_once > 5:
             break
         probes.clear()
-        settings = ROOMS, f"base.pose=[0.4,0.6,{0.7 * seed}]", "robots.count=40", f"robots.sensors.0.sd_rad={noise_rad}"
+        settings = (
+            ROOMS,
+            f"base.pose=[0.4,0.6,{0.7 * seed}]",
+            "robots.count=40",
+            f"robots.sensors.0.sd_rad={noise_rad}",
+            "time.duration_s=1000.0",
+        )
         run("sensor-coverage-narrow", seed, "inline", settings)
         counted += sum(len(seen) for *_, seen in probes)
         for (robot, began_s, ended_s, seen), (other, its_began_s, its_ended_s, _) in permutations(probes, 2):

@@ -62,7 +62,8 @@ def _of_both(left: NearArc, right: NearArc) -> Arc:
     """Return the arc of one wall that a robot followed from one point, with the left hand and with the right one."""
     first, second = _before_end(left), _before_end(right)
     between = math.remainder(_begin_of(right) - _begin_of(left), math.tau)
-    return Arc(first.start_rad, first.width_rad - left.begin_rad + between + second.width_rad - right.begin_rad)
+    width = first.width_rad - left.begin_rad + between + second.width_rad - right.begin_rad
+    return Arc(first.start_rad, min(width, math.tau))
 
 
 def _is_joined(one: NearArc, other: NearArc) -> bool:

@@ -9,6 +9,7 @@ from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
 from zwerm.agents.sensor_coverage.frontier.proofs.swarm_proof import SwarmProof
 from zwerm.agents.sensor_coverage.frontier.slots import Slots
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, NearArc, Walk, WalkPoint
+from zwerm.agents.sensor_coverage.messages.commands import Sighting
 from zwerm.maths.simplicial import FlagComplex
 
 # Slot 1 is at the right of slot 0, in touch with it.
@@ -18,12 +19,16 @@ SCAN = ScanResult(VIEWS, FlagComplex(VIEWS), ())
 APART_DEG = 360 - 50 - 90
 
 
-def test_robots_are_in_touch_if_each_of_them_touches_the_other() -> None:
-    """Robot 7 touches a robot without a slot, and names robot 8, which stands far behind that one."""
-    slots = Slots()
-    for robot, touched in ((7, (8, 20)), (8, (9,)), (9, (8,))):
-        slots.touch(slots.add(robot), (), touched)
-    assert slots.slots_in_touch() == {0: (), 1: (2,), 2: (1,)}
+@pytest.mark.parametrize("named", [8, 7])
+def test_robots_are_in_touch_if_each_of_them_touches_one_in_the_direction_of_the_other(named: int) -> None:
+    """Robot 7 touches one without a slot, and names robot 8 behind it. Robot 9 touches robot 8, and names one in line."""
+    slots, line = Slots(), (7, 20, 8, 9)
+    for robot, touched in ((7, 8), (8, 9), (9, named)):
+        slots.touch(slots.add(robot), (), (touched,))
+        others = (each for each in line if each != robot)
+        slots.take(robot, (Sighting(each, 0.0 if line.index(each) > line.index(robot) else math.pi) for each in others))
+    assert slots.slots_in_touch()[0] == ()
+    assert slots.slots_in_touch()[1] == (2,)
 
 
 def update(proof: SwarmProof, wall_deg: int, *near_deg: tuple[int, int]) -> None:
