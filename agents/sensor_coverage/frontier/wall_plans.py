@@ -230,7 +230,7 @@ class WallPlans:
         begins: Sequence[Arc] = (),
         past_ends: Sequence[Arc] = (),
     ) -> None:
-        """Record arcs (start, width) [rad] around a slot of one kind: its hand, its robot, and whether they are past ends.
+        """Record arcs (start, width) [rad] around a slot of one kind (`NearArc.kind`).
 
         Arcs of different walks stay apart: where they meet, a wall may end and another one begin far behind it.
         """

@@ -75,7 +75,8 @@ class NearArc(NamedTuple):
     """An arc around a slot in which its robot followed a wall close to it, with the wall at its `hand`, +1 left, -1 right.
 
     The arc counts for the `robot`, or for ANYONE. Past an end a wall may end. The last `begin_rad` of the arc, at the edge
-    where the robot's way along the wall begins, are beyond the touched point.
+    where the robot's way along the wall begins, are beyond the touched point, and at the other edge the wall may end by
+    `end_rad` before it. `stay` is the number of the stay at the slot in which it was found.
     """
 
     arc: Arc
