@@ -99,7 +99,7 @@ class WalkPoint(NamedTuple):
     `robots` are the slots that the walking robot touches. `at_body` is true if it touches a robot that stands at no slot,
     `left_walls` if it does not follow the wall of the point before any more (`leaves_wall`). `unplaced` are the marks
     (`mark_of`) of robots without a known slot that see it. `at` is the robot's place [m] by odometry, in this frame.
-    `was_seen` is true if a slot saw it that counts as if it had not.
+    `was_seen` is true if a slot saw it that counts as if it had not, `is_bridged` if the wall goes on behind the robots there.
     """
 
     seen: Mapping[int, float]
@@ -110,6 +110,7 @@ class WalkPoint(NamedTuple):
     unplaced: tuple[int, ...] = ()
     at: tuple[float, float] = (0.0, 0.0)
     was_seen: bool = False
+    is_bridged: bool = False
 
     @property
     def is_blind(self) -> bool:
@@ -313,10 +314,7 @@ def arcs_of_step(slot: int, before: WalkPoint | None, point: WalkPoint, hand: in
 
 
 def _passes_by(before: WalkPoint, point: WalkPoint, there: float) -> float:
-    """Return a number with the sign of the turn to the left by which a step is seen in a direction [rad], by the odometry.
-
-    It is 0 if the robot did not move.
-    """
+    """Return a number with the sign of the turn to the left by which a step is seen in a direction [rad], or 0 without one."""
     x_m, y_m = point.at[0] - before.at[0], point.at[1] - before.at[1]
     return y_m * math.cos(there) - x_m * math.sin(there)
 

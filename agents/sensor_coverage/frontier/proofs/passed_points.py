@@ -6,6 +6,7 @@ from collections.abc import Set as AbstractSet
 from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.directions import angle_between
+from zwerm.agents.sensor_coverage.frontier.strips.bridges import TouchedBy, bridged
 from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import FollowedStretch, Pocket, StretchEnd, touched_point
 from zwerm.agents.sensor_coverage.frontier.strips.sight_ends import (
     SightEnd,
@@ -72,6 +73,17 @@ class Passed(NamedTuple):
         return any(each in standing for each in self.ties) or any(each.is_seen(standing) for each in self.sight_ends)
 
 
+def all_passes(walk: Walk, first: int, touched_by: TouchedBy) -> Iterator[tuple[int, Passed]]:
+    """Yield what `passes` does, where walls go on behind robots that touch them (`bridges`); `touched_by` has their contacts.
+
+    These robots themselves see the wall on both sides.
+    """
+    whole, robots = bridged(walk, touched_by)
+    yield from (each for each in passes(whole, first) if each[0] not in robots)
+    if robots:
+        yield from (each for each in passes(walk, first) if each[0] in robots)
+
+
 def passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
     """Yield each slot that saw a point of a walk with a contact, and that point; `first` is the number of the first point.
 
@@ -85,7 +97,8 @@ def passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
     # No other slot relies on what the origin saw: that counts while its robot stands there.
     others = walk.points if walk.origin is None else [each.unseen_by((walk.origin.slot,)) for each in walk.points]
     for number, point in enumerate(walk.points):
-        touch.take(number, point.walls, point.at_body, point.left_walls)
+        if not point.is_bridged:
+            touch.take(number, point.walls, point.at_body, point.left_walls)
         if point.is_blind:
             continue
         now = SeenPoint(number, point)
@@ -97,7 +110,8 @@ def passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
                 continue
             since = last[slot].number if slot in last else number
             between = tuple(each.seen.keys() for each in others[since:number] if slot not in each.seen)
-            before = point_before(slot, last.get(slot), now, touch.since, bool(between))
+            before_it = None if point.is_bridged else last.get(slot)
+            before = point_before(slot, before_it, now, touch.since, bool(between))
             there = stretch_of.get(since) if before is not None else None
             ends = () if here is None or there is None else (there.first, here.last)
             beside = pockets_beside(slot, number, walk.points, stretches, walk.hand) if slot in point.robots else ()
@@ -112,7 +126,8 @@ def passes(walk: Walk, first: int) -> Iterator[tuple[int, Passed]]:
                 slot,
                 Passed(first + number, before, point, walk.hand, between, number_of, ends, pockets, edges, dark, ties),
             )
-            last[slot] = now
+            if not point.is_bridged:
+                last[slot] = now
 
 
 def still_counting(
@@ -174,6 +189,8 @@ def left_at_bodies(
     touch, found = TouchCounter(), dict[int, tuple[LeftWall, ...]]()
     latest, at_body, robots = -1, False, dict[int, None]()
     for number, point in enumerate(points):
+        if point.is_bridged:
+            continue
         touch.take(number, point.walls, point.at_body, point.left_walls)
         at_body, robots = at_body or point.at_body, robots | dict.fromkeys(point.robots)
         if point.walls:

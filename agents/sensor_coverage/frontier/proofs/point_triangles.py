@@ -23,7 +23,7 @@ TOUCHED_RAD: Final = math.radians(8.0)
 CLOSED_STEP_RAD: Final = math.radians(3.0)
 
 Views = Mapping[int, Mapping[int, float]]
-# The direction [rad] of a point from a slot, its stretch if it is on the slot's own way, and the other slots that saw it, with
+# The direction [rad] of a point from a slot, its number if it is on the slot's own way, and the other slots that saw it, with
 # their directions.
 _Lost = tuple[float, int | None, tuple[tuple[int, float], ...]]
 # The directions [rad] of an end of a stretch from a slot that ties it and from another one, and all slots that tie it.
@@ -51,7 +51,9 @@ class PointTriangles:
         self._forget()
 
     def _forget(self) -> None:
-        self._stretch_of: dict[int, int] = {}  # the number of the first point of the stretch, by the number of a point
+        self._stretch_of: dict[
+            tuple[int, int], int
+        ] = {}  # its first point, by a slot and the number of a point that it saw
         self._since: dict[int, int] = {}  # the number of the first point of the first walk that a slot saw
         # The points that a slot saw, each with its walk, its directions [rad], and its number if it is on the slot's own way.
         self._seen: dict[int, list[tuple[int, WalkPoint, tuple[float, ...], int | None]]] = {}
@@ -71,7 +73,7 @@ class PointTriangles:
 
     def add(self, slot: int, number: int, stretch: int, walk: int, point: WalkPoint) -> None:
         """Add a point of a walk that a slot saw; `stretch` and `walk` are the numbers of their first points."""
-        self._stretch_of[number] = stretch
+        self._stretch_of[slot, number] = stretch
         self._since.setdefault(slot, walk)
         self._seen.setdefault(slot, []).append((walk, point, (point.seen[slot],), None))
 
@@ -94,9 +96,9 @@ class PointTriangles:
             (walk, point, (there - aside, there + aside), number) for number, (there, point) in enumerate(points, walk)
         )
 
-    def stretch_of(self, number: int) -> int:
-        """Return the number of the first point of a point's stretch, or -1."""
-        return self._stretch_of.get(number, -1)
+    def stretch_of(self, slot: int, number: int) -> int:
+        """Return the number of the first point of the stretch of a point that a slot saw, or -1."""
+        return self._stretch_of.get((slot, number), -1)
 
     def pairs(self, number: int) -> tuple[Pair, ...]:
         """Return (slot, other slot) for each triangle with a point that counts at the slot, as they were found last."""
@@ -163,9 +165,11 @@ class PointTriangles:
         bare = self._bare.setdefault(pair, {})
         for each in chain(within, beyond):
             if each not in bare:
-                _, stretch, saw = lost[each]
+                _, number, saw = lost[each]
                 bare[each] = not any(
-                    self._is_proved(*one, other) if stretch is None else self._is_witness(*one, pair, stretch)
+                    self._is_proved(*one, other)
+                    if number is None
+                    else self._is_witness(*one, pair, self.stretch_of(one[0], number))
                     for one in saw
                 )
             if bare[each]:
@@ -205,7 +209,7 @@ class PointTriangles:
             known += (
                 (
                     there % math.tau,
-                    None if number is None else self.stretch_of(number),
+                    number,
                     tuple(one for one in each.seen.items() if one[0] != slot),
                 )
                 for walk, each, directions, number in points[count:]

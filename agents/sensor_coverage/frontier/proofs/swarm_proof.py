@@ -12,7 +12,7 @@ from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.fans import Pair, pair_of, side_of
 from zwerm.agents.sensor_coverage.frontier.plan import ScanResult
-from zwerm.agents.sensor_coverage.frontier.proofs.passed_points import Passed, passes, still_counting
+from zwerm.agents.sensor_coverage.frontier.proofs.passed_points import Passed, all_passes, still_counting
 from zwerm.agents.sensor_coverage.frontier.proofs.point_triangles import PointTriangles
 from zwerm.agents.sensor_coverage.frontier.proofs.reliance import Fan, circular_gaps
 from zwerm.agents.sensor_coverage.frontier.proofs.robot_arcs import RobotArcs
@@ -87,8 +87,8 @@ class SwarmProof:
         Return the slots around which points of walks count no more, because a slot that saw them is gone.
         """
         before = self._neighbours
-        self._index(walks)
         self._touched_by = touched_by
+        self._index(walks)
         self._bases, self._stays = scan.bases, self._origins.stays_at(stays)
         complex_ = scan.complex_
         gone = [slot for slot in before if slot not in complex_.neighbours]
@@ -168,7 +168,7 @@ class SwarmProof:
             self._triangles.begin_again(same)
             self._forget()
         for walk in walks[self._count :]:
-            for slot, passed in passes(walk, len(self._points)):
+            for slot, passed in all_passes(walk, len(self._points), self._touched_by):
                 self._passed.setdefault(slot, []).append(passed)
                 self._triangles.add(slot, passed.number, passed.stretch, len(self._points), passed.point)
                 self._triangles.add_tied(slot, passed.point, passed.ties)
@@ -185,8 +185,7 @@ class SwarmProof:
 
     def _refresh(self, changed: dict[int, None], gone: Iterable[int]) -> None:
         """Find the arcs again of slots around which something has changed, and of those that rely on slots that are gone."""
-        points: dict[int, None] = {}
-        stale = dict(changed)
+        points, stale = dict[int, None](), dict(changed)
         for slot in gone:
             points |= dict.fromkeys(each.number for each in self._passed.get(slot, ()))
             stale |= self._witnessed.get(slot, {})
@@ -394,4 +393,4 @@ class SwarmProof:
             return ends_at(walls.followed, point.seen[slot], side)
         if any(ends_at(walls.followed, each, side) for each in self._origins.touched(slot, number, side)):
             return True
-        return ends_at(walls.by_stretch.get(self._triangles.stretch_of(number), ()), point.seen[slot], side)
+        return ends_at(walls.by_stretch.get(self._triangles.stretch_of(slot, number), ()), point.seen[slot], side)

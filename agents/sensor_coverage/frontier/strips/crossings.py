@@ -17,6 +17,7 @@ from zwerm.agents.sensor_coverage.frontier.strips.loose_ends import (
     StretchEnd,
     Vector,
     direction_of,
+    is_shut,
     kept_part,
     touched_point,
 )
@@ -34,8 +35,6 @@ from zwerm.agents.sensor_coverage.motion.homing import unit
 # A pocket closes this part of a body's radius beyond the touched point: two of them on both sides of a robot, with an error
 # of a quarter of a radius each by the width of a switch, are narrower than an opening of 1.3 bodies.
 OVERHANG: Final = 1.0
-# An opening narrower than this many diameters of a body need not be found.
-PASSABLE: Final = 1.3
 # A bearing's error [rad]: twice its noise.
 BEARING_RAD: Final = math.radians(5.0)
 
@@ -124,9 +123,8 @@ def _are_at_corners(pocket: Pocket, wall_rad: float, contact_rad: float) -> bool
 def _arc_between_walls(pocket: Pocket, other: Vector) -> Iterator[Arc]:
     """Yield the arc from the touched wall of a pocket to another touched point [m], if no opening fits in between.
 
-    Each of the two points is known within half a switch. The slot's robot does not stand between the two.
+    The slot's robot does not stand between the two.
     """
     arc = arc_between(direction_of(pocket.place, pocket.end.touched), direction_of(pocket.place, other))
-    apart_m = math.dist(pocket.end.touched, other)
-    if apart_m <= 2.0 * (PASSABLE - math.sin(CONTACT_RAD)) * pocket.radius_m and arc.width_rad <= math.pi / 2.0:
+    if is_shut(pocket.end.touched, other, pocket.radius_m) and arc.width_rad <= math.pi / 2.0:
         yield arc

@@ -23,6 +23,10 @@ INWARD: Final = 1e-3
 # Near the slot a step has many directions, and an end may be within them: they are tested this far apart [rad].
 WITHIN_RAD: Final = math.radians(5.0)
 
+# An opening narrower than 1.3 diameters of a body need not be found. Two touched points, each known within half a switch, are
+# so far apart at least, in diameters, if there is a wider one between them.
+SHUT: Final = 1.3 - math.sin(math.radians(15.0))
+
 
 class StretchEnd(NamedTuple):
     """The walking robot's place [m] at an end of a stretch, the point of the wall that it touched, and the slots of `ties`.
@@ -88,6 +92,11 @@ def touched_point(at: Vector, bearing_rad: float, radius_m: float) -> Vector:
 def place_of_robot(at: Vector, there_rad: float, radius_m: float) -> Vector:
     """Return the place [m] of a robot in touch with one at a place, which it sees in a direction [rad]."""
     return at[0] - 2.0 * radius_m * math.cos(there_rad), at[1] - 2.0 * radius_m * math.sin(there_rad)
+
+
+def is_shut(a: Vector, b: Vector, radius_m: float) -> bool:
+    """Return whether no opening fits between two touched points [m]."""
+    return math.dist(a, b) < 2.0 * SHUT * radius_m
 
 
 # A place [m] of the walking robot, and the directions of walls that it touches there.

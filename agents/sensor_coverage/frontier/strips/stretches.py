@@ -143,7 +143,8 @@ def stretches_of(walk: Walk) -> dict[int, FollowedStretch]:
     tracker = StretchTracker(walk.hand, walk.radius_m)
     first_numbers: dict[int, int] = {}
     for number, point in enumerate(walk.points):
-        tracker.take(number, point.at, point.walls, point.robots, point.seen, point.at_body, point.left_walls)
+        if not point.is_bridged:
+            tracker.take(number, point.at, point.walls, point.robots, point.seen, point.at_body, point.left_walls)
         if point.walls and tracker.latest is not None:
             first_numbers[number] = tracker.latest.first_number
     found, last = tracker.found, tracker.latest
