@@ -6,14 +6,14 @@ counts again only when a view or a wall has changed, also if a third slot that s
 """
 
 import math
-from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Collection, Iterable, Mapping
+from bisect import bisect_left, bisect_right, insort
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import chain
 from operator import itemgetter
-from typing import Final
+from typing import Final, NamedTuple
 
 from zwerm.agents.sensor_coverage.frontier.fans import Beyond, Pair, fan_of, is_between
-from zwerm.agents.sensor_coverage.frontier.wall_proof import WalkPoint, arc_between
+from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, WalkPoint, arc_between
 
 # A point of a walk lies within a triangle's angle only if it is this far from its sides: bearings have noise.
 HIDDEN_MIN_RAD: Final = math.radians(2.0)
@@ -26,9 +26,19 @@ Views = Mapping[int, Mapping[int, float]]
 # The direction [rad] of a point from a slot, its number if it is on the slot's own way, and the other slots that saw it, with
 # their directions.
 _Lost = tuple[float, int | None, tuple[tuple[int, float], ...]]
-# The directions [rad] of an end of a stretch from a slot that ties it and from another one, and all slots that tie it.
-_Tied = tuple[float, float, tuple[int, ...]]
 _DIRECTION: Final = itemgetter(0)
+
+
+class _TiedEnd(NamedTuple):
+    """The directions [rad] of an end of a stretch from a slot that ties it and from another one, and all slots that tie it.
+
+    The first direction is not negative. `number` counts the ends of the two slots.
+    """
+
+    here_rad: float
+    there_rad: float
+    ties: tuple[int, ...]
+    number: int
 
 
 class PointTriangles:
@@ -60,8 +70,10 @@ class PointTriangles:
         # The points that a slot saw, and another one that stood then did not. They hold for the number of points that the slot
         # saw.
         self._lost: dict[tuple[int, int], tuple[int, list[_Lost]]] = {}
-        # The ends of stretches that a slot ties and another one sees, by these two: the directions [rad] from both, the ties.
-        self._tied: dict[Pair, list[_Tied]] = {}
+        # The ends of stretches that a slot ties and another one sees, by these two, in the order of their first directions.
+        self._tied: dict[Pair, list[_TiedEnd]] = {}
+        # Whether the first slot answers alone for what is behind such an end, by its number, until the proof of a slot changes.
+        self._leaks: dict[Pair, dict[int, bool]] = {}
         # Whether no other slot that saw a lost point is proved, by its number among them, until the proof of a slot changes.
         self._bare: dict[Pair, dict[int, bool]] = {}
 
@@ -84,7 +96,8 @@ class PointTriangles:
             past = there + TOUCHED_RAD * math.sin(wall - there)
             for each in ties:
                 if each != slot and each in point.seen:
-                    self._tied.setdefault((each, slot), []).append((point.seen[each], past, ties))
+                    ends = self._tied.setdefault((each, slot), [])
+                    insort(ends, _TiedEnd(point.seen[each] % math.tau, past, ties, len(ends)), key=_DIRECTION)
 
     def add_way(self, slot: int, walk: int, points: Iterable[tuple[float, WalkPoint]]) -> None:
         """Add the points of a walk that began at a slot, and their directions [rad] from there, also those out of its sight.
@@ -112,6 +125,7 @@ class PointTriangles:
     def forget_proved(self) -> None:
         """Forget what `is_proved` stated: the proof of a slot has changed."""
         self._bare.clear()
+        self._leaks.clear()
 
     def find(
         self,
@@ -182,15 +196,22 @@ class PointTriangles:
         The second slot relies on it for what is behind that end. So the first does not rely on the second, unless walls or
         triangles of robots without the second one close all directions behind the end anyway.
         """
+        ends = self._tied.get(pair)
+        if not ends:
+            return False
         slot, other = pair
         to_other, to_slot, here, there = views[slot][other], views[other][slot], point.seen[slot], point.seen[other]
-        return any(
-            is_between(here_end, to_other, here, HIDDEN_MIN_RAD)
-            and is_between(there, to_slot, there_end, HIDDEN_MIN_RAD)
-            and all(each == slot or each not in views for each in ties)
-            and not self._is_closed(slot, here_end, there_end, other)
-            for here_end, there_end, ties in self._tied.get(pair, ())
-        )
+        leaks = self._leaks.setdefault(pair, {})
+        for end in _within(ends, arc_between(to_other, here)):
+            if is_between(end.here_rad, to_other, here, HIDDEN_MIN_RAD) and is_between(
+                there, to_slot, end.there_rad, HIDDEN_MIN_RAD
+            ):
+                if end.number not in leaks:
+                    alone = all(each == slot or each not in views for each in end.ties)
+                    leaks[end.number] = alone and not self._is_closed(slot, end.here_rad, end.there_rad, other)
+                if leaks[end.number]:
+                    return True
+        return False
 
     def _is_closed(self, slot: int, a_rad: float, b_rad: float, other: int) -> bool:
         """Return whether all directions of a slot between two others [rad] are proved without another slot."""
@@ -220,6 +241,16 @@ class PointTriangles:
             self._bare.pop((slot, other), None)
             self._lost[slot, other] = len(points), known
         return known
+
+
+def _within(ends: Sequence[_TiedEnd], arc: Arc) -> Iterator[_TiedEnd]:
+    """Yield the ends whose first directions are in an arc; `ends` are in their order."""
+    first = arc.start_rad % math.tau
+    last = first + arc.width_rad
+    begin = bisect_left(ends, first, key=_DIRECTION)
+    yield from ends[begin : bisect_right(ends, last, key=_DIRECTION)]
+    if last > math.tau:
+        yield from ends[: min(begin, bisect_right(ends, last - math.tau, key=_DIRECTION))]
 
 
 def _crosses(pair: Pair, point: WalkPoint, views: Views, neighbours: Mapping[int, Collection[int]]) -> bool:

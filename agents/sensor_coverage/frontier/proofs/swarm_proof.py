@@ -332,7 +332,11 @@ class SwarmProof:
             self._triangles.drop(number)
             return ()
         standing = [slot for slot in point.seen if slot in self._neighbours]
-        at_walls = {(slot, side): self._ends_beyond(slot, number, side) for slot in standing for side in (1, -1)}
+        paired = [slot for slot in standing if not self._neighbours[slot].isdisjoint(standing)]
+        if not paired:
+            self._triangles.drop(number)
+            return ()
+        at_walls = {(slot, side): self._ends_beyond(slot, number, side) for slot in paired for side in (1, -1)}
         views = self._views
         beside = (pair for pair in self._origins.beside(number, views) if not self._closes_beyond(*pair, point))
         without = *beside, *self._behind_bodies(point, standing)
