@@ -49,7 +49,7 @@ def carry_out(
         *building.settings(),
         *((building.death(),) if dies else ()),
         "robots.count=30",
-        "time.duration_s=2000.0",
+        "time.duration_s=1000.0",
     )
     run_seed = seed if run_seed is None else run_seed
     return run("sensor-coverage-narrow", run_seed, "inline", (*settings, *more), watcher=watcher)
