@@ -313,7 +313,7 @@ def test_a_swarm_in_a_corridor_that_a_death_has_parted_is_joined_again() -> None
 
 def test_the_base_waits_for_robots_out_of_its_reach() -> None:
     """The base receives nothing for four minutes; the others have not changed then."""
-    result = with_faults(SMALL, '{kind="partition", groups=[[0]], at_s=30.0, for_s=240.0}')
+    result = with_faults(SMALL, '{kind="partition", groups=[[0]], at_s=30.0, for_s=240.0}', 3)
     assert is_covered(result)
     assert result.sim_s > 270.0
 
