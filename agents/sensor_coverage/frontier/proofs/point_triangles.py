@@ -58,6 +58,7 @@ class PointTriangles:
         self._is_witness = is_witness
         self._basis: dict[int, tuple[object, object, object]] = {}
         self._pairs: dict[int, tuple[Pair, ...]] = {}
+        self._numbers: dict[Pair, dict[int, None]] = {}  # of the points, by pair
         self._forget()
 
     def _forget(self) -> None:
@@ -81,7 +82,8 @@ class PointTriangles:
         """Forget all points, which are added again, but for the triangles that count with the points `same`."""
         self._forget()
         self._basis = {number: each for number, each in self._basis.items() if number in same}
-        self._pairs = {number: each for number, each in self._pairs.items() if number in same}
+        for number in [each for each in self._pairs if each not in same]:
+            self._keep(number, ())
 
     def add(self, slot: int, number: int, stretch: int, walk: int, point: WalkPoint) -> None:
         """Add a point of a walk that a slot saw; `stretch` and `walk` are the numbers of their first points."""
@@ -117,10 +119,23 @@ class PointTriangles:
         """Return (slot, other slot) for each triangle with a point that counts at the slot, as they were found last."""
         return self._pairs.get(number, ())
 
+    def numbers(self, slot: int, other: int) -> list[int]:
+        """Return the numbers of the points of triangles with two slots that count at one of them, ascending."""
+        return sorted(self._numbers.get((slot, other), {}) | self._numbers.get((other, slot), {}))
+
     def drop(self, number: int) -> None:
         """Let no triangle with a point count."""
-        self._pairs.pop(number, None)
+        self._keep(number, ())
         self._basis.pop(number, None)
+
+    def _keep(self, number: int, pairs: tuple[Pair, ...]) -> None:
+        """Keep the triangles with a point that count."""
+        for each in self._pairs.pop(number, ()):
+            del self._numbers[each][number]
+        if pairs:
+            self._pairs[number] = pairs
+            for each in pairs:
+                self._numbers.setdefault(each, {})[number] = None
 
     def forget_proved(self) -> None:
         """Forget what `is_proved` stated: the proof of a slot has changed."""
@@ -142,12 +157,13 @@ class PointTriangles:
         `versions` count the changes of views. The triangles of the pairs `close` do not count.
         """
         basis = [(slot, versions[slot]) for slot in point.seen if slot in neighbours], at_walls, close
+        known = self.pairs(number)
         if self._basis.get(number) == basis and not any(
-            self._hides(pair, point, views) or self._ties(pair, point, views) for pair in self._pairs[number]
+            self._hides(pair, point, views) or self._ties(pair, point, views) for pair in known
         ):
-            return self._pairs[number]
+            return known
         self._basis[number] = basis
-        pairs = self._pairs[number] = fan_of(
+        pairs = fan_of(
             point,
             views,
             neighbours,
@@ -159,6 +175,7 @@ class PointTriangles:
                 or _crosses(each, point, views, neighbours)
             ),
         )
+        self._keep(number, pairs)
         return pairs
 
     def _hides(self, pair: Pair, point: WalkPoint, views: Views) -> bool:

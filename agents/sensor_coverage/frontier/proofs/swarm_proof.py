@@ -270,10 +270,8 @@ class SwarmProof:
         """Return the numbers of the points of the triangles with an edge that count at one of its ends, by side."""
         found: dict[int, list[int]] = {}
         there = self._views[pair[0]][pair[1]]
-        for each in self._passed.get(pair[0], ()):
-            counting = self._triangles.pairs(each.number)
-            if pair in counting or pair[::-1] in counting:
-                found.setdefault(side_of(each.point, pair[0], there), []).append(each.number)
+        for number in self._triangles.numbers(*pair):
+            found.setdefault(side_of(self._points[number], pair[0], there), []).append(number)
         return found
 
     def _best(self, pair: Pair, numbers: Sequence[int], opened: Mapping[int, Sequence[Arc]]) -> int:
