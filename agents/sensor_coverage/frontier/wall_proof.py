@@ -314,7 +314,7 @@ def arcs_of_step(slot: int, before: WalkPoint | None, point: WalkPoint, hand: in
 
 
 def _passes_by(before: WalkPoint, point: WalkPoint, there: float) -> float:
-    """Return a number with the sign of the turn to the left by which a step is seen in a direction [rad], or 0 without one."""
+    """Return the sign, times a length, of the left turn by which a step is seen in a direction [rad], by the odometry."""
     x_m, y_m = point.at[0] - before.at[0], point.at[1] - before.at[1]
     return y_m * math.cos(there) - x_m * math.sin(there)
 

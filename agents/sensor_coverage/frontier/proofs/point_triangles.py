@@ -7,10 +7,10 @@ counts again only when a view or a wall has changed, also if a third slot that s
 
 import math
 from bisect import bisect_left, bisect_right, insort
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from itertools import chain
 from operator import itemgetter
-from typing import Final, NamedTuple
+from typing import Final
 
 from zwerm.agents.sensor_coverage.frontier.fans import Beyond, Pair, fan_of, is_between
 from zwerm.agents.sensor_coverage.frontier.wall_proof import Arc, WalkPoint, arc_between
@@ -26,19 +26,9 @@ Views = Mapping[int, Mapping[int, float]]
 # The direction [rad] of a point from a slot, its number if it is on the slot's own way, and the other slots that saw it, with
 # their directions.
 _Lost = tuple[float, int | None, tuple[tuple[int, float], ...]]
+# The directions [rad] of an end of a stretch from a slot that ties it and from another one, and all slots that tie it.
+_Tied = tuple[float, float, tuple[int, ...]]
 _DIRECTION: Final = itemgetter(0)
-
-
-class _TiedEnd(NamedTuple):
-    """The directions [rad] of an end of a stretch from a slot that ties it and from another one, and all slots that tie it.
-
-    The first direction is not negative. `number` counts the ends of the two slots.
-    """
-
-    here_rad: float
-    there_rad: float
-    ties: tuple[int, ...]
-    number: int
 
 
 class PointTriangles:
@@ -62,9 +52,8 @@ class PointTriangles:
         self._forget()
 
     def _forget(self) -> None:
-        self._stretch_of: dict[
-            tuple[int, int], int
-        ] = {}  # its first point, by a slot and the number of a point that it saw
+        # The number of the first point of the stretch, by a slot and the number of a point that it saw.
+        self._stretch_of: dict[tuple[int, int], int] = {}
         self._since: dict[int, int] = {}  # the number of the first point of the first walk that a slot saw
         # The points that a slot saw, each with its walk, its directions [rad], and its number if it is on the slot's own way.
         self._seen: dict[int, list[tuple[int, WalkPoint, tuple[float, ...], int | None]]] = {}
@@ -72,8 +61,8 @@ class PointTriangles:
         # saw.
         self._lost: dict[tuple[int, int], tuple[int, list[_Lost]]] = {}
         # The ends of stretches that a slot ties and another one sees, by these two, in the order of their first directions.
-        self._tied: dict[Pair, list[_TiedEnd]] = {}
-        # Whether the first slot answers alone for what is behind such an end, by its number, until the proof of a slot changes.
+        self._tied: dict[Pair, list[_Tied]] = {}
+        # Whether the first slot answers alone for what is behind such an end, by its number among them, until a proof changes.
         self._leaks: dict[Pair, dict[int, bool]] = {}
         # Whether no other slot that saw a lost point is proved, by its number among them, until the proof of a slot changes.
         self._bare: dict[Pair, dict[int, bool]] = {}
@@ -99,7 +88,8 @@ class PointTriangles:
             for each in ties:
                 if each != slot and each in point.seen:
                     ends = self._tied.setdefault((each, slot), [])
-                    insort(ends, _TiedEnd(point.seen[each] % math.tau, past, ties, len(ends)), key=_DIRECTION)
+                    insort(ends, (point.seen[each] % math.tau, past, ties), key=_DIRECTION)
+                    self._leaks.pop((each, slot), None)
 
     def add_way(self, slot: int, walk: int, points: Iterable[tuple[float, WalkPoint]]) -> None:
         """Add the points of a walk that began at a slot, and their directions [rad] from there, also those out of its sight.
@@ -189,12 +179,8 @@ class PointTriangles:
         if width <= 2.0 * HIDDEN_MIN_RAD:
             return False
         lost = self._lost_by(slot, other)
-        first = (start + HIDDEN_MIN_RAD) % math.tau
-        last = first + width - 2.0 * HIDDEN_MIN_RAD
-        within = range(bisect_right(lost, first, key=_DIRECTION), bisect_left(lost, last, key=_DIRECTION))
-        beyond = range(bisect_left(lost, last - math.tau, key=_DIRECTION) if last > math.tau else 0)
         bare = self._bare.setdefault(pair, {})
-        for each in chain(within, beyond):
+        for each in _within(lost, Arc(start + HIDDEN_MIN_RAD, width - 2.0 * HIDDEN_MIN_RAD)):
             if each not in bare:
                 _, number, saw = lost[each]
                 bare[each] = not any(
@@ -219,14 +205,15 @@ class PointTriangles:
         slot, other = pair
         to_other, to_slot, here, there = views[slot][other], views[other][slot], point.seen[slot], point.seen[other]
         leaks = self._leaks.setdefault(pair, {})
-        for end in _within(ends, arc_between(to_other, here)):
-            if is_between(end.here_rad, to_other, here, HIDDEN_MIN_RAD) and is_between(
-                there, to_slot, end.there_rad, HIDDEN_MIN_RAD
+        for each in _within(ends, arc_between(to_other, here)):
+            here_end, there_end, ties = ends[each]
+            if is_between(here_end, to_other, here, HIDDEN_MIN_RAD) and is_between(
+                there, to_slot, there_end, HIDDEN_MIN_RAD
             ):
-                if end.number not in leaks:
-                    alone = all(each == slot or each not in views for each in end.ties)
-                    leaks[end.number] = alone and not self._is_closed(slot, end.here_rad, end.there_rad, other)
-                if leaks[end.number]:
+                if each not in leaks:
+                    alone = all(one == slot or one not in views for one in ties)
+                    leaks[each] = alone and not self._is_closed(slot, here_end, there_end, other)
+                if leaks[each]:
                     return True
         return False
 
@@ -260,14 +247,13 @@ class PointTriangles:
         return known
 
 
-def _within(ends: Sequence[_TiedEnd], arc: Arc) -> Iterator[_TiedEnd]:
-    """Yield the ends whose first directions are in an arc; `ends` are in their order."""
+def _within(known: Sequence[_Lost] | Sequence[_Tied], arc: Arc) -> Iterable[int]:
+    """Return the numbers of those whose direction is inside an arc. They are in the order of their directions in [0, 2 pi)."""
     first = arc.start_rad % math.tau
     last = first + arc.width_rad
-    begin = bisect_left(ends, first, key=_DIRECTION)
-    yield from ends[begin : bisect_right(ends, last, key=_DIRECTION)]
-    if last > math.tau:
-        yield from ends[: min(begin, bisect_right(ends, last - math.tau, key=_DIRECTION))]
+    within = range(bisect_right(known, first, key=_DIRECTION), bisect_left(known, last, key=_DIRECTION))
+    beyond = range(bisect_left(known, last - math.tau, key=_DIRECTION) if last > math.tau else 0)
+    return chain(within, beyond)
 
 
 def _crosses(pair: Pair, point: WalkPoint, views: Views, neighbours: Mapping[int, Collection[int]]) -> bool:

@@ -20,14 +20,13 @@ RADIUS_M = 0.07
 STANDING, NORTH = 3, 5
 STAY = 8
 SOUTH = -math.pi / 2.0
-SOUTH_DEG = -90.0
 IN_TOUCH = {(STANDING, STAY): (SOUTH,)}
 
 
 def walk_past(y_m: float = RADIUS_M, at_body: bool = False) -> Walk:
     """Return the walk past a robot at (0, y)."""
-    half = math.degrees(math.acos((RADIUS_M - y_m) / (2.0 * RADIUS_M)))
-    turn = [math.radians(SOUTH_DEG - half - each * (360.0 - 2.0 * half) / 10.0) for each in range(11)]
+    half_rad = math.acos((RADIUS_M - y_m) / (2.0 * RADIUS_M))
+    turn = [SOUTH - half_rad - each * (math.tau - 2.0 * half_rad) / 10.0 for each in range(11)]
     around = [(2.0 * RADIUS_M * math.cos(each), y_m + 2.0 * RADIUS_M * math.sin(each)) for each in turn]
     x_m = around[-1][0]
     before = [(-x_m - 0.05 * each, RADIUS_M) for each in range(8, 0, -1)]
